@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from tcs.errors import RobotError
 from tcs.files.documents import Document, Entries, Placed, read_document
-from tcs.files.paths import DataFiles
+from tcs.files.paths import DataFiles, expanded
 from tcs.model.robots.checks import check_robot
 from tcs.model.robots.loading import ROBOTS
 from tcs.model.robots.loading import load_robot as load_bare_robot
@@ -18,6 +18,17 @@ from tcs.model.robots.robot_file import BodyPrimitive, ExtraBody, ExtraFrame, Na
 TOOLS = DataFiles("tool", "models/tools/*.yaml")
 HELD = "+"
 """Separates robot and tool in the name of a robot that holds one, e.g. "pr2+spoon"."""
+
+
+class ToolMesh(Placed):
+    """The mesh of a tool, and its pose in the tool's frame."""
+
+    file: str
+    """An OBJ, STL or glTF file; its path from the folder of the tool file."""
+    scale: Annotated[float, Field(gt=0.0, le=1000.0)] = 1.0
+    """Metres per unit of the file."""
+    protrusion: Annotated[float, Field(ge=0.001, le=0.05)] = 0.003
+    """Distance by which the shapes around it may protrude [m]."""
 
 
 class ToolFile(Document):
@@ -32,8 +43,16 @@ class ToolFile(Document):
     """Pose of the tool in the tool frame of the robot."""
     gripper: Name | None = None
     """Name of the gripper opening while it is held; None leaves that of the robot file."""
-    shapes: Annotated[tuple[BodyPrimitive, ...], Entries, Field(min_length=1)]
-    """Shapes that enclose the tool, in its own frame."""
+    shapes: Annotated[tuple[BodyPrimitive, ...], Entries] = ()
+    """Shapes that enclose the tool, in its own frame, with those around its mesh."""
+    mesh: ToolMesh | None = None
+    """A closed mesh to enclose, in its own frame."""
+
+    @model_validator(mode="after")
+    def _has_a_volume(self) -> Self:
+        if not self.shapes and self.mesh is None:
+            raise ValueError("give 'shapes' or 'mesh', or both")
+        return self
 
 
 def tool_names() -> tuple[str, ...]:
@@ -53,7 +72,39 @@ def load_tool(name_or_path: str | Path) -> ToolFile:
         RobotError: If the file cannot be read or its content is invalid.
     """
     path = TOOLS.path(name_or_path)
-    return read_document(path, ToolFile, f"tool file '{path}'", RobotError)
+    where = f"tool file '{path}'"
+    tool = read_document(path, ToolFile, where, RobotError)
+    if tool.mesh is None:
+        return tool
+    shapes = (*tool.shapes, *_around(tool.mesh, path.parent, where))
+    return tool.model_copy(update={"shapes": shapes, "mesh": None})
+
+
+def _around(mesh: ToolMesh, folder: Path, where: str) -> list[BodyPrimitive]:
+    """Return the shapes around a mesh, in the tool's frame.
+
+    Raises:
+        RobotError: If the file cannot be used.
+    """
+    # Imported where they are needed: they are slow to import, and few tools have a mesh.
+    from scipy.spatial.transform import Rotation
+
+    from tcs.model.robots.fitting.mesh_shapes import shapes_around_mesh
+
+    file = folder / expanded(mesh.file, f"{where}, field 'mesh.file'", RobotError)
+    here = f"{where}, field 'mesh'"
+    placed = Rotation.from_euler("xyz", mesh.rpy)
+    found = []
+    for shape in shapes_around_mesh(file, mesh.scale, mesh.protrusion, here, RobotError):
+        turned = placed * Rotation.from_quat(shape.quaternion, scalar_first=True)
+        x, y, z = (placed.apply(shape.xyz) + mesh.xyz).tolist()
+        roll, pitch, yaw = turned.as_euler("xyz", True, suppress_warnings=True).tolist()
+        found.append(
+            BodyPrimitive(
+                kind=shape.kind, size=shape.size, xyz=(x, y, z), rpy_deg=(roll, pitch, yaw)
+            )
+        )
+    return found
 
 
 def holding(robot: str | Path, tool: str | Path) -> str:

@@ -1,4 +1,4 @@
-"""Meshes and point clouds that obstacles are read from."""
+"""Point clouds that obstacles are read from."""
 
 from __future__ import annotations
 
@@ -9,43 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.errors import EnvironmentFileError, RobotError
-from tcs.files.quantities import POSITION
+from tcs.errors import EnvironmentFileError
 from tcs.files.reading import read_bytes
-from tcs.model.robots.urdf.meshes import MAX_BYTES, mesh_triangles
+from tcs.model.robots.fitting.mesh_shapes import check_positions
+from tcs.model.robots.urdf.meshes import MAX_BYTES
 
 FloatArray = NDArray[np.float64]
 
 LEAST_POINTS = 10
 """Fewest points of a cloud that count as an obstacle."""
 MOST_POINTS = 5_000_000
-_DECIMALS = 7
-"""Corners that agree to so many decimals are one: exporters write each triangle by itself."""
-
-
-def closed_mesh(file: Path, scale: float, where: str) -> FloatArray:
-    """Return the triangles of a closed mesh [m], shape (n, 3, 3).
-
-    Args:
-        file: An OBJ, STL or glTF file.
-        scale: Metres per unit of the file.
-        where: Name of the obstacle in messages.
-
-    Raises:
-        EnvironmentFileError: If it cannot be read, is not closed, or leaves the scene.
-    """
-    try:
-        triangles = np.asarray(mesh_triangles(file)) * scale
-    except RobotError as error:
-        raise EnvironmentFileError(f"{where}: {error}") from None
-    _check_positions(triangles, f"{where}: mesh '{file}'")
-    single = _open_edges(triangles)
-    if single:
-        raise EnvironmentFileError(
-            f"{where}: mesh '{file}' is not closed: {single:,} of its edges do not join two "
-            "triangles, so its inside is unknown. Close it, or give boxes that enclose it."
-        )
-    return triangles
 
 
 def cloud_points(file: Path, scale: float, where: str) -> FloatArray:
@@ -83,24 +56,5 @@ def cloud_points(file: Path, scale: float, where: str) -> FloatArray:
             f"{MOST_POINTS:,}. Give single objects as 'box' or 'sphere'."
         )
     points = points[:, :3] * scale
-    _check_positions(points, here)
+    check_positions(points, here, EnvironmentFileError)
     return points
-
-
-def _check_positions(points: FloatArray, where: str) -> None:
-    """Refuse coordinates that are not positions in a scene."""
-    extremes = float(points.min()), float(points.max())
-    POSITION.check(extremes, f"{where}: a coordinate", EnvironmentFileError)
-
-
-def _open_edges(triangles: FloatArray) -> int:
-    """Return how many edges do not join as many triangles in either direction."""
-    corners = np.round(triangles.reshape(-1, 3), _DECIMALS) + 0.0
-    _, index = np.unique(corners, axis=0, return_inverse=True)
-    faces = index.reshape(-1, 3)
-    faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
-    edges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
-    ways = np.where(edges[:, 0] < edges[:, 1], 1, -1)
-    _, of = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
-    balance = np.bincount(of.ravel(), weights=ways)
-    return int(np.count_nonzero(balance))

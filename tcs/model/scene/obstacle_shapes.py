@@ -6,36 +6,25 @@ enclose them.
 
 from __future__ import annotations
 
-import hashlib
 import math
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.errors import EnvironmentFileError, RobotError
-from tcs.files.paths import cache_folder
-from tcs.files.reading import read_bytes
-from tcs.model.robots.fitting import Target
-from tcs.model.robots.fitting.covering import fit_triangles
-from tcs.model.robots.primitives import Primitive, read_primitives, write_primitives
-from tcs.model.robots.urdf.meshes import MAX_BYTES
+from tcs.errors import EnvironmentFileError
+from tcs.model.robots.fitting.mesh_shapes import PROTRUSION, closed_mesh, shapes_around_mesh
+from tcs.model.robots.primitives import Primitive
 from tcs.model.scene.environment import Obstacle
-from tcs.model.scene.obstacle_files import closed_mesh, cloud_points
+from tcs.model.scene.obstacle_files import cloud_points
 from tcs.model.scene.occupied_cells import boxes_of_cells
 
 FloatArray = NDArray[np.float64]
 
-PROTRUSION = 0.01
-"""Distance by which the shapes around a mesh may protrude unless the file says otherwise [m]."""
 CELL = 0.03
 """Edge of the cells of a point cloud unless the file says otherwise [m]."""
-MOST_SHAPES = 100
-"""Largest number of shapes around a mesh; if they do not suffice, some protrude farther."""
 _SIDES = 6
 """Boxes of a cylinder: its circumscribed prism has twice as many sides."""
-_VERSION = "1"
-"""Part of the cache key: increase it when the fit changes."""
 _NO_ROTATION = (1.0, 0.0, 0.0, 0.0)
 
 
@@ -65,7 +54,8 @@ def obstacle_shapes(obstacle: Obstacle, where: str) -> tuple[Primitive, ...]:
         return _prism(*obstacle.cylinder)
     file, scale = Path(str(obstacle.file)), obstacle.scale or 1.0
     if obstacle.type == "mesh":
-        return _around_mesh(file, scale, obstacle.protrusion or PROTRUSION, where)
+        protrusion = obstacle.protrusion or PROTRUSION
+        return shapes_around_mesh(file, scale, protrusion, where, EnvironmentFileError)
     if obstacle.type == "cloud":
         points = cloud_points(file, scale, where)
         cell = obstacle.cell or CELL
@@ -83,7 +73,9 @@ def solid_volume(obstacle: Obstacle, where: str) -> float | None:
         EnvironmentFileError: If its file cannot be used.
     """
     if obstacle.type == "mesh":
-        triangles = closed_mesh(Path(str(obstacle.file)), obstacle.scale or 1.0, where)
+        triangles = closed_mesh(
+            Path(str(obstacle.file)), obstacle.scale or 1.0, where, EnvironmentFileError
+        )
         a, b, c = np.moveaxis(triangles, 1, 0)
         return abs(float(np.einsum("ni,ni->n", a, np.cross(b, c)).sum())) / 6.0
     if obstacle.cylinder is not None:
@@ -119,21 +111,3 @@ def _prism(radius: float, length: float) -> tuple[Primitive, ...]:
         quaternion = (math.cos(half), 0.0, 0.0, math.sin(half))
         found.append(_primitive("box", (2.0 * radius, width, length), quaternion=quaternion))
     return tuple(found)
-
-
-def _around_mesh(file: Path, scale: float, protrusion: float, where: str) -> tuple[Primitive, ...]:
-    """Return shapes that enclose a mesh; the user's cache keeps them."""
-    content = read_bytes(file, f"{where}: mesh '{file}'", EnvironmentFileError, limit=MAX_BYTES)
-    triangles = closed_mesh(file, scale, where)
-    key = hashlib.sha256(content)
-    key.update(repr((_VERSION, file.suffix.lower(), scale, protrusion, MOST_SHAPES)).encode())
-    kept = cache_folder("obstacles") / f"{file.stem}_{key.hexdigest()[:16]}.csv"
-    if kept.is_file():
-        try:
-            return read_primitives(kept)
-        except RobotError:
-            # Damaged: fitted again.
-            pass
-    fit = fit_triangles(file.stem, triangles, Target(protrusion, MOST_SHAPES))
-    write_primitives(kept, fit.primitives)
-    return read_primitives(kept)

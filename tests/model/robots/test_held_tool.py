@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
 
 from tcs.errors import RobotError, UnknownNameError
 from tcs.model.robots import holding, load_robot, load_tool, tool_names
@@ -77,3 +79,37 @@ def test_faults_of_a_tool_are_one_line(wand, tmp_path):
     wand.write_text(WAND.replace("name: wand", "name: l_gripper_palm_link"))
     with pytest.raises(RobotError, match="the name is taken"):
         load_robot(f"pr2+{wand}")
+
+
+def test_a_tool_may_be_a_mesh(wand, tmp_path):
+    solid = trimesh.creation.cone(radius=20.0, height=150.0)
+    solid.export(tmp_path / "funnel.stl")
+    mesh = "mesh: {file: funnel.stl, scale: 0.001, xyz: [0.1, 0, 0], rpy_deg: [10, 90, 20]}\n"
+    wand.write_text(WAND[: WAND.index("shapes:")] + mesh)
+    held = load_robot(holding("pr2", wand))
+    shapes = [s for s in held.load_primitives() if s.body == "wand"]
+    turn = Rotation.from_euler("xyz", [10, 90, 20], degrees=True)
+    points = turn.apply(solid.vertices * 0.001) + np.array([0.1, 0, 0])
+    # STL keeps seven digits; the shapes enclose what is in the file.
+    assert np.any([s.contains(points, tolerance=1e-6) for s in shapes], axis=0).all()
+    # They protrude by 3 mm at most, at the rim by more.
+    around = np.array([[0.1, 0.0, 0.04], [0.1 + 0.16, 0.0, 0.0], [0.0, 0.1, 0.0]])
+    assert not np.any([s.contains(around) for s in shapes], axis=0).any()
+
+
+def test_meshes_of_tools_that_cannot_be_used_are_one_line(wand, tmp_path):
+    head = WAND[: WAND.index("shapes:")]
+    wand.write_text(head)
+    with pytest.raises(RobotError, match="give 'shapes' or 'mesh', or both"):
+        load_robot(f"pr2+{wand}")
+    wand.write_text(head + "mesh: {file: none.stl}\n")
+    with pytest.raises(RobotError, match=r"field 'mesh': mesh '.*none\.stl'") as caught:
+        load_robot(f"pr2+{wand}")
+    assert "\n" not in str(caught.value)
+    solid = trimesh.creation.box((0.1, 0.1, 0.1))
+    solid.update_faces(np.arange(len(solid.faces)) != 3)
+    solid.export(tmp_path / "open.stl")
+    wand.write_text(head + "mesh: {file: open.stl}\n")
+    with pytest.raises(RobotError, match=r"open\.stl' is not closed: 3 of its edges") as caught:
+        load_robot(f"pr2+{wand}")
+    assert "\n" not in str(caught.value)

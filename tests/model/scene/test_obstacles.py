@@ -5,11 +5,11 @@ import pytest
 import trimesh
 
 from tcs.errors import EnvironmentFileError
+from tcs.model.robots.fitting.mesh_shapes import closed_mesh
 from tcs.model.robots.primitives import enclosed, union_volume
 from tcs.model.scene import environment_shapes, load_environment
 from tcs.model.scene.environment import Obstacle
 from tcs.model.scene.environment_check import check_environment
-from tcs.model.scene.obstacle_files import closed_mesh
 from tcs.model.scene.obstacle_shapes import obstacle_shapes
 from tcs.model.scene.occupied_cells import boxes_of_cells
 
@@ -73,7 +73,7 @@ def test_shapes_enclose_a_mesh_and_its_inside(tmp_path, suffix):
     solid.export(file)
     obstacle = Obstacle(name="tin", file=str(file), scale=0.001, protrusion=0.005)
     shapes = obstacle_shapes(obstacle, "tin")
-    assert enclosed(shapes, closed_mesh(file, 0.001, "tin")).all()
+    assert enclosed(shapes, closed_mesh(file, 0.001, "tin", EnvironmentFileError)).all()
     assert inside(shapes, np.array([[0.2, 0, 0], [0.3, 0.05, -0.04]])).all()
     assert union_volume(shapes) < 1.05 * 0.3 * 0.2 * 0.1
     # The cache gives the same shapes again.
