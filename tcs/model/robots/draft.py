@@ -242,7 +242,8 @@ def _arm(model: Urdf, tool: str, base: str | None) -> tuple[list[Joint], str, Jo
         raise RobotError(
             f"{where}: an arm of six or seven revolute joints is needed, but from "
             f"'{base or model.root}' to tool frame '{tool}' only {len(arm)} in a row lead there "
-            f"({found}{end}). Name another tool frame or base."
+            f"({found}{end}): {LEAST_JOINTS - len(arm)} of the six freedoms of a goal would be "
+            "missing. Name another tool frame or base."
         )
     exact = base is not None and movable == arm
     arm_base = str(base) if exact else arm[0].parent

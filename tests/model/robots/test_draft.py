@@ -119,6 +119,7 @@ def test_too_few_joints_are_one_clear_line(tmp_path):
     file = tmp_path / "short.urdf"
     file.write_text(urdf(joints=5))
     found = r"only 5 in a row lead there \(a1, a2, a3, a4, a5; 'lift' before them is prismatic\)"
+    found += ": 1 of the six freedoms of a goal would be missing"
     with pytest.raises(RobotError, match=found) as e:
         draft_robot(file, "tool")
     assert "\n" not in str(e.value)
