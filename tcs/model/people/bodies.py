@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from tcs.errors import DataFileError, UnknownNameError
 from tcs.kernel.arrays import FloatArray
+from tcs.model.people.children import ADULT, survey_at
 from tcs.model.people.survey import (
     FARTHEST_SCORE,
     MASS,
@@ -43,7 +44,9 @@ class Body:
     measures: Mapping[str, float]
     """Values of all measures, by their names in the survey [m; kg for the mass]."""
     percentiles: Mapping[str, float]
-    """Percentile of each among people of that sex, 0 to 100."""
+    """Percentile of each among people of that sex and age, 0 to 100."""
+    age: float | None = None
+    """Age of a child [years]; None of an adult."""
 
     @property
     def stature(self) -> float:
@@ -56,9 +59,10 @@ class Body:
         return self.measures[MASS]
 
     def to_json(self) -> dict[str, Any]:
-        """Return sex, measures and percentiles as plain containers."""
+        """Return sex, age of a child, measures and percentiles as plain containers."""
         return {
             "sex": self.sex,
+            **({} if self.age is None else {"age": self.age}),
             "measures": dict(self.measures),
             "percentiles": {name: round(p, 2) for name, p in self.percentiles.items()},
         }
@@ -74,6 +78,8 @@ class Bodies:
     """Whether each is male, shape (N,)."""
     values: FloatArray
     """Values [m; kg for the mass], shape (N, M)."""
+    ages: tuple[float | None, ...] | None = None
+    """Age of each child [years], None of an adult; None if all are adults."""
 
     def __len__(self) -> int:
         """Return the number of people."""
@@ -81,15 +87,17 @@ class Bodies:
 
     def __getitem__(self, number: int) -> Body:
         """Return one of them."""
-        survey = load_survey("male" if self.is_male[number] else "female")
+        age = None if self.ages is None else self.ages[number]
+        survey = survey_at("male" if self.is_male[number] else "female", age)
         values = self.values[number]
         scores = [survey.score(i, float(values[i])) for i in range(len(values))]
-        return _body(survey, values, np.array(scores))
+        return _body(survey, values, np.array(scores), age)
 
 
 def body(
     sex: str,
     *,
+    age: float | None = None,
     percentiles: Mapping[str, float] | None = None,
     measures: Mapping[str, float] | None = None,
 ) -> Body:
@@ -107,14 +115,17 @@ def body(
 
     Args:
         sex: One of SEXES.
-        percentiles: Percentile of each known measure, 0.1 to 99.9.
+        age: Age [years]; by default that of an adult.
+        percentiles: Percentile of each known measure, 0.1 to 99.9, among people of that age.
         measures: Measured values [m; kg for the mass]. A name is in one of the two only.
 
     Raises:
         UnknownNameError: If there is no such sex or measure.
-        DataFileError: If a value or percentile is out of range, or a measure is given twice.
+        DataFileError: If a value or percentile is out of range, a measure is given twice, or the
+            age is below that of the youngest.
     """
-    survey = load_survey(sex)
+    age = age if age is not None and age < ADULT else None
+    survey = survey_at(sex, age)
     known: dict[int, float] = {}
     for name, percentile in (percentiles or {}).items():
         _once(known, survey.index(name), name)
@@ -123,17 +134,17 @@ def body(
     for name, value in (measures or {}).items():
         number = survey.index(name)
         _once(known, number, name)
-        known[number] = _measured(survey, number, value)
+        known[number] = _measured(survey, number, value, age)
         exact[number] = float(value)
     scores = _filled_in(survey, known)
     values = survey.values(scores)
     # A measure as it was given, not as it comes back from its percentile.
     for number, value in exact.items():
         values[number] = value
-    return _body(survey, values, scores)
+    return _body(survey, values, scores, age)
 
 
-def draw_bodies(number: int, *, sex: str = ANY, seed: int = 0) -> Bodies:
+def draw_bodies(number: int, *, sex: str = ANY, age: float | None = None, seed: int = 0) -> Bodies:
     """Return people drawn at random.
 
     The first hundred of a thousand are a hundred of the same seed.
@@ -141,11 +152,12 @@ def draw_bodies(number: int, *, sex: str = ANY, seed: int = 0) -> Bodies:
     Args:
         number: Number of people.
         sex: One of SEXES, or "any": women and men in turn.
+        age: Age of all [years]; by default that of an adult.
         seed: Seed of the random numbers.
 
     Raises:
         UnknownNameError: If the sex is unknown.
-        TcsError: If the number or the seed is out of range.
+        TcsError: If the number, the age or the seed is out of range.
     """
     check_draws(number, seed)
     if sex not in (*SEXES, ANY):
@@ -153,20 +165,22 @@ def draw_bodies(number: int, *, sex: str = ANY, seed: int = 0) -> Bodies:
     is_male = np.arange(number) % 2 == 1 if sex == ANY else np.full(number, sex == "male")
     values = np.empty((number, len(load_survey(SEXES[0]).measures)))
     for one, chosen in (("female", ~is_male), ("male", is_male)):
-        survey = load_survey(one)
+        survey = survey_at(one, age)
         normal = named_generator(seed, f"bodies/{one}").standard_normal(
             (int(chosen.sum()), len(survey.measures))
         )
         values[chosen] = survey.values(normal @ np.linalg.cholesky(survey.correlation).T)
-    return Bodies(load_survey(SEXES[0]).measures, is_male, values)
+    ages = (age,) * number if age is not None and age < ADULT else None
+    return Bodies(load_survey(SEXES[0]).measures, is_male, values, ages)
 
 
-def _body(survey: Survey, values: FloatArray, scores: FloatArray) -> Body:
+def _body(survey: Survey, values: FloatArray, scores: FloatArray, age: float | None) -> Body:
     percentiles = percentile_of(scores).tolist()
     return Body(
         survey.sex,
         dict(zip(survey.measures, values.tolist(), strict=True)),
         dict(zip(survey.measures, percentiles, strict=True)),
+        age,
     )
 
 
@@ -197,14 +211,15 @@ def _checked(name: str, percentile: float) -> float:
     return float(percentile)
 
 
-def _measured(survey: Survey, number: int, value: float) -> float:
+def _measured(survey: Survey, number: int, value: float, age: float | None) -> float:
     """Return the normal score of a measured value in range."""
     lower, upper = survey.range_of(number)
     name = survey.measures[number]
     if not (math.isfinite(value) and lower <= value <= upper):
         unit = "kg" if name == MASS else "m"
+        who = "an adult" if age is None else f"a child of {age:g} years"
         raise DataFileError(
             f"person: '{name}' is {value:g} {unit}; must be {lower:.3g} to {upper:.3g} {unit} for "
-            f"an adult who is {survey.sex}."
+            f"{who} who is {survey.sex}."
         )
     return survey.score(number, value)

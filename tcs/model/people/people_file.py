@@ -23,8 +23,9 @@ _MAX_BYTES = 64_000_000
 def load_people(path: str | Path) -> Bodies:
     """Return the people of a CSV file.
 
-    The first row names the columns: `sex`, and measures or their percentiles as keys of a person in
-    an environment file. What a row leaves empty is filled in as of a single person.
+    The first row names the columns: `sex`, `age` [years] of children, and measures or their
+    percentiles as keys of a person in an environment file. What a row leaves empty is filled in as
+    of a single person.
 
     Args:
         path: The file.
@@ -85,4 +86,5 @@ def _bodies(people: list[Body]) -> Bodies:
         measures,
         np.array([person.sex == "male" for person in people]),
         np.array([[person.measures[name] for name in measures] for person in people]),
+        tuple(person.age for person in people),
     )

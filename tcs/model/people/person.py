@@ -53,7 +53,7 @@ class Person(Document):
     sex: Literal["female", "male"] | None = None
     """Sex; without it the model keeps the sizes of its file."""
     age: Annotated[Number, Field(ge=4.0, le=120.0)] | None = None
-    """Age [years], which ranges of motion depend on."""
+    """Age [years], which ranges of motion depend on; below 18 years also the sizes of the body."""
     posture: str | None = None
     """Name of a posture. In a file it may also be a mapping: `name`, and angles `JOINT_deg`."""
 
@@ -188,7 +188,7 @@ class Person(Document):
         }
         measures = {k: v for k, v in self.known.items() if not k.endswith(PERCENTILE)}
         try:
-            return body(self.sex, percentiles=percentiles, measures=measures)
+            return body(self.sex, age=self.age, percentiles=percentiles, measures=measures)
         except UnknownNameError as error:
             known = (*error.known, MODEL, "sex")
             raise UnknownNameError(error.what, error.name, known, where=where) from None
@@ -202,6 +202,7 @@ class Person(Document):
             of_body = self.body()
             found |= {
                 "sex": of_body.sex,
+                **({} if of_body.age is None else {"age": of_body.age}),
                 "stature": round(of_body.stature, 4),
                 "stature_percentile": round(of_body.percentiles["stature"], 1),
                 "mass": round(of_body.mass, 2),

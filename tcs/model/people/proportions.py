@@ -7,7 +7,7 @@ in. A link of another person has the size of his, times the ratio of the measure
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 
 import numpy as np
@@ -87,6 +87,8 @@ LINKS: Mapping[str, tuple[Sum, Sum, Sum]] = {
 
 _RATIOS = (0.6, 2.5)
 """Least and greatest ratio; those of the survey's people lie within."""
+_LEAST_OF_CHILDREN = 0.3
+"""Least ratio of children."""
 
 Scale = tuple[float, float, float]
 """Ratios of sizes along x, y and z of a link's frame."""
@@ -114,7 +116,9 @@ def link_scales(person: Body) -> dict[str, Scale]:
         DataFileError: If measures contradict each other, so that a link has no length left.
     """
     values = {name: np.array([value]) for name, value in person.measures.items()}
-    return {link: _triple(ratios[0]) for link, ratios in _ratios(values, ("person",)).items()}
+    least = _least((person.age,))
+    ratios = _ratios(values, ("person",), least)
+    return {link: _triple(of_link[0]) for link, of_link in ratios.items()}
 
 
 def scales_of_people(people: Bodies) -> list[dict[str, Scale]]:
@@ -125,7 +129,8 @@ def scales_of_people(people: Bodies) -> list[dict[str, Scale]]:
     """
     values = dict(zip(people.measures, people.values.T, strict=True))
     names = tuple(f"person {number}" for number in range(len(people)))
-    ratios = {link: found.tolist() for link, found in _ratios(values, names).items()}
+    least = _least(people.ages or (None,) * len(people))
+    ratios = {link: found.tolist() for link, found in _ratios(values, names, least).items()}
     return [
         {link: _triple(found[number]) for link, found in ratios.items()}
         for number in range(len(people))
@@ -137,12 +142,20 @@ def _triple(ratios: FloatArray | list[float]) -> Scale:
     return x, y, z
 
 
-def _ratios(values: Mapping[str, FloatArray], people: tuple[str, ...]) -> dict[str, FloatArray]:
+def _least(ages: Sequence[float | None]) -> FloatArray:
+    """Return the least ratio of people of these ages, shape (N,)."""
+    return np.array([_RATIOS[0] if age is None else _LEAST_OF_CHILDREN for age in ages])
+
+
+def _ratios(
+    values: Mapping[str, FloatArray], people: tuple[str, ...], least: FloatArray
+) -> dict[str, FloatArray]:
     """Return the ratios of each link, shapes (N, 3).
 
     Args:
         values: The measures of N people, shapes (N,).
         people: What messages call each of them.
+        least: Least ratio of each of them, shape (N,).
     """
     reference = papers_man().measures
     found = {}
@@ -152,15 +165,16 @@ def _ratios(values: Mapping[str, FloatArray], people: tuple[str, ...]) -> dict[s
             before = sum(factor * reference[name] for name, factor in measures.items())
             after = sum(factor * values[name] for name, factor in measures.items())
             columns.append(np.asarray(after / before))
-            _check(columns[-1], people, link, measures)
+            _check(columns[-1], people, link, measures, least)
         found[link] = np.stack(columns, axis=1)
     return found
 
 
-def _check(ratios: FloatArray, people: tuple[str, ...], link: str, measures: Sum) -> None:
+def _check(
+    ratios: FloatArray, people: tuple[str, ...], link: str, measures: Sum, least: FloatArray
+) -> None:
     """Refuse people of whom a link would have no plausible size."""
-    lower, upper = _RATIOS
-    for number in np.flatnonzero(~((lower <= ratios) & (ratios <= upper)))[:1]:
+    for number in np.flatnonzero(~((least <= ratios) & (ratios <= _RATIOS[1])))[:1]:
         raise DataFileError(
             f"{people[number]}: {', '.join(measures)} do not fit together: the "
             f"{link.replace('_', ' ')} would be {ratios[number]:.2g} times that of an average man. "

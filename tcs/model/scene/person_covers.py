@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from tcs.kernel.arrays import FloatArray
 from tcs.model.people import Scale
@@ -130,8 +129,11 @@ def _around(
 
 
 def _turn(before: FloatArray, after: FloatArray) -> FloatArray:
-    """Return the least rotation that takes one unit vector to another, not opposite, one."""
-    axis = np.cross(before, after)
-    sine = float(np.linalg.norm(axis))
-    angle = math.atan2(sine, float(before @ after))
-    return np.asarray(Rotation.from_rotvec(angle * axis / sine).as_matrix())
+    """Return the least rotation that takes one unit vector to another, not opposite, one.
+
+    With v = before x after and its matrix V, it is I + V + V^2 / (1 + before . after).
+    """
+    (a, b, c), (d, e, f) = before.tolist(), after.tolist()
+    x, y, z = b * f - c * e, c * d - a * f, a * e - b * d
+    V = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + V + V @ V / (1.0 + a * d + b * e + c * f))

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 NOUNS = {"female": "a woman", "male": "a man"}
+CHILDREN = {"female": "a girl", "male": "a boy"}
 
 
 def person_text(entry: Mapping[str, Any]) -> str:
@@ -17,12 +18,18 @@ def person_text(entry: Mapping[str, Any]) -> str:
     >>> person_text({"sex": "female", "stature": 1.525, "stature_percentile": 5.0, "mass": 58.2,
     ...              "mass_percentile": 18.8})
     'a woman of 1.525 m (5th percentile) and 58.2 kg (19th percentile)'
+    >>> person_text({"sex": "male", "age": 6, "stature": 1.16, "stature_percentile": 50,
+    ...              "mass": 20.8, "mass_percentile": 50})
+    'a boy of 6 years, 1.160 m (50th percentile) and 20.8 kg (50th percentile)'
     """
     who = "the average man"
     if "sex" in entry:
         stature, mass = (_ordinal(entry[f"{key}_percentile"]) for key in ("stature", "mass"))
-        who = (
-            f"{NOUNS[entry['sex']]} of {entry['stature']:.3f} m ({stature} percentile) and "
+        who = f"{NOUNS[entry['sex']]} of "
+        if "age" in entry:
+            who = f"{CHILDREN[entry['sex']]} of {entry['age']:g} years, "
+        who += (
+            f"{entry['stature']:.3f} m ({stature} percentile) and "
             f"{entry['mass']:.1f} kg ({mass} percentile)"
         )
     posture = entry.get("posture")
