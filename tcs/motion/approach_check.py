@@ -9,8 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tcs.errors import TcsError
+from tcs.kernel.approach.scene import approach_scene
 from tcs.kernel.approach.sweep import ApproachLines, approach_spline
 from tcs.kernel.arrays import FloatArray
+from tcs.kernel.motion.scene import MotionScene
 from tcs.kernel.problem import Problem, build_problem
 from tcs.model.scene import NeighbourList, Scene, goal_poses
 from tcs.motion.curves import Curve
@@ -79,6 +81,8 @@ class ApproachScene:
     problem: Problem
     lines: ApproachLines
     neighbours: NeighbourList
+    around: MotionScene
+    """The scene of the certified checks."""
 
     @classmethod
     def of(cls, file: ScoreFile) -> ApproachScene:
@@ -90,7 +94,8 @@ class ApproachScene:
         """
         job, scene, lowered = rebuild_scene(file)
         problem = build_problem(lowered.arrays, lowered.grid)
-        return cls(job, scene, problem, approach_lines(job), NeighbourList(scene))
+        neighbours, around = NeighbourList(scene), approach_scene(problem)
+        return cls(job, scene, problem, approach_lines(job), neighbours, around)
 
     def check(self, number: int, goal: int, q: FloatArray) -> ApproachFinding | None:
         """Return the finding on the approach of a posture, None if no approach is found from it.
@@ -100,7 +105,7 @@ class ApproachScene:
             goal: Number of the goal.
             q: Joint angles at the goal [rad], shape (7,).
         """
-        spline = approach_spline(self.problem, self.lines, number, goal, q)
+        spline = approach_spline(self.problem, self.lines, number, goal, q, self.around)
         if spline is None:
             return None
         points, tangents = spline

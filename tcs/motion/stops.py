@@ -12,7 +12,7 @@ from tcs.errors import TaskError
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.motion.edges import NO_PAIR, posture_contact
 from tcs.kernel.motion.groups import grouped
-from tcs.kernel.motion.idle import list_needed
+from tcs.kernel.motion.idle import needed_pairs
 from tcs.kernel.motion.scene import (
     MotionScene,
     MotionWorkspace,
@@ -137,19 +137,13 @@ class StopGrid:
 
         Pairs of the robot's own shapes that never touch are left out.
         """
-        every, first_robot = torso_scene(self.problem, torso), self.problem.environment_bodies
-        other = every.body[every.pair[:, 1]]
-        own = with_pairs(every, other >= first_robot)
-        needed = np.ones(len(own.pair), np.bool_)
-        list_needed(own, new_motion_workspace(own), needed)
-        kept = np.ones(len(every.pair), np.bool_)
-        kept[other >= first_robot] = needed
+        every, robot = torso_scene(self.problem, torso), self.problem.environment_bodies
+        kept, other = needed_pairs(every, robot), every.body[every.pair[:, 1]]
         paths = grouped(with_pairs(every, kept))
         if not self.job.task.keep_out:
             return paths, paths
         # The boxes are the last bodies of the environment.
-        first = first_robot - len(self.job.task.keep_out)
-        outside = (other < first) | (other >= first_robot)
+        outside = (other < robot - len(self.job.task.keep_out)) | (other >= robot)
         return paths, grouped(with_pairs(every, kept & outside))
 
 

@@ -9,13 +9,10 @@ import numpy as np
 from tcs.kernel.analytic.ik import sample_joints, wrist_goal
 from tcs.kernel.analytic.solver import ArmSolver
 from tcs.kernel.approach.grid import PIECES, LineGrid
-from tcs.kernel.approach.scene import keep_near, list_groups, list_shapes
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.cache import inner
+from tcs.kernel.cache import inner, int_constant
 from tcs.kernel.contacts import Workspace
-from tcs.kernel.motion.edges import listed_are_free_until, take_middle
-from tcs.kernel.motion.pairs import take_posture
-from tcs.kernel.motion.planes import take_twists
+from tcs.kernel.motion.edges import curve_is_free_until
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
 from tcs.kernel.motion.straight import (
     OFF_LINE,
@@ -25,16 +22,14 @@ from tcs.kernel.motion.straight import (
     keep_within_limits,
     new_straight_workspace,
     take_piece,
+    take_pieces,
 )
 from tcs.kernel.numeric.newton import factorise, step_to_goal
-from tcs.kernel.problem import Problem
 
+FIRST = int_constant(0)
 FEWEST, DOUBLINGS = 2, 3
 """Number of pieces of the spline tried first, and how often it is doubled until the spline is close
 enough to the line."""
-PARTS = 8
-"""Number of parts of the line for which shapes that may meet are listed: on longer ones most
-may."""
 AT_POINT = 1e-7
 """Greatest error of a point of the spline [rad and m], as for solutions."""
 
@@ -51,16 +46,14 @@ class CurveWorkspace(NamedTuple):
     goal: FloatArray
     """A pose on the line as from `wrist_goal`, shape (4, 3)."""
     blocked: IntArray
-    """Level of the grid at the end of the piece that is blocked, and the pair; shape (2,)."""
+    """Level of the grid at or after which it is blocked, seen from the goal, and the pair; shape
+    (2,)."""
     pieces: IntArray
     """Number of pieces of the spline, shape (1,)."""
-    near: IntArray
-    """Pairs of groups: all listed, then those that may meet on the current piece, shape
-    (2, pairs)."""
 
 
-def new_curve(pairs: int) -> CurveWorkspace:
-    """Return memory for one worker, for a number of pairs in the scene."""
+def new_curve() -> CurveWorkspace:
+    """Return memory for one worker."""
     most = FEWEST * 2**DOUBLINGS + 1
     return CurveWorkspace(
         np.empty((most, 7)),
@@ -69,7 +62,6 @@ def new_curve(pairs: int) -> CurveWorkspace:
         np.empty((4, 3)),
         np.zeros(2, np.int64),
         np.zeros(1, np.int64),
-        np.tile(np.arange(pairs), (2, 1)),
     )
 
 
@@ -130,62 +122,22 @@ def fill_spline(
 
 
 @inner
-def spline_is_free(
-    problem: Problem,
-    work: Workspace,
-    scene: MotionScene,
-    motion: MotionWorkspace,
-    curve: CurveWorkspace,
-) -> bool:
+def spline_is_free(scene: MotionScene, motion: MotionWorkspace, curve: CurveWorkspace) -> bool:
     """Return whether the spline is certified; fills `curve.blocked` if it is not.
 
     Args:
-        problem: The scene.
-        work: Workspace with the environment in A.
-        scene: Its pairs are filled.
-        motion: The shapes around the arm are in place.
+        scene: The shapes around the arm are in place.
+        motion: So are they here.
         curve: Holds the spline.
     """
     pieces = curve.pieces[0]
     points, tangents = curve.points[: pieces + 1], curve.tangents[: pieces + 1]
-    groups = list_groups(problem, work, scene, motion, points, tangents)
-    for n in range(pieces):
-        take_piece(motion, points, tangents, n)
-        free = _free_until(problem, scene, motion, curve.near, groups, max(PARTS // pieces, 1))
-        if free < 1.0:
-            curve.blocked[0] = min(int((n + free) / pieces * PIECES) + 1, PIECES)
-            curve.blocked[1] = motion.contact[0]
-            return False
-    return True
-
-
-@inner
-def _free_until(
-    problem: Problem,
-    scene: MotionScene,
-    motion: MotionWorkspace,
-    near: IntArray,
-    groups: int,
-    parts: int,
-) -> float:
-    """Return how far the current curve is certified in a number of parts; 1 for all of it.
-
-    Only the first pairs of the scene, those of `groups`, and of their shapes are checked.
-    """
-    take_middle(motion, 0.0, 1.0)
-    take_posture(scene, motion)
-    take_twists(motion)
-    left = keep_near(scene, motion, near[0], groups, near[1])
-    for part in range(parts if left else 0):
-        begin, end = part / parts, (part + 1) / parts
-        take_middle(motion, begin, end)
-        take_posture(scene, motion)
-        take_twists(motion)
-        count = list_shapes(problem, scene, motion, groups, near[1], left)
-        free = listed_are_free_until(scene, motion, count, begin, end)
-        if free < end:
-            return free
-    return 1.0
+    take_pieces(motion, points, tangents, FIRST, pieces)
+    if curve_is_free_until(scene, motion) == 1.0:
+        return True
+    curve.blocked[0] = min(int(np.ceil(motion.met[0] * PIECES)), PIECES)
+    curve.blocked[1] = motion.contact[0]
+    return False
 
 
 @inner

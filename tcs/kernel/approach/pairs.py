@@ -31,7 +31,7 @@ from tcs.kernel.approach.grid import (
     place_levels,
     take_path,
 )
-from tcs.kernel.approach.scene import new_scene, pair_contact_code
+from tcs.kernel.approach.scene import pair_contact_code
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner
 from tcs.kernel.contacts import (
@@ -92,16 +92,16 @@ class Approach(NamedTuple):
     """First contact that blocked a motion, as a code, shape (1,)."""
 
 
-def new_approach(problem: Problem) -> Approach:
-    """Return the memory of one worker."""
-    scene = new_scene(problem)
+def new_approach(problem: Problem, scene: MotionScene) -> Approach:
+    """Return the memory of one worker, given the `approach_scene` of the problem."""
+    scene = scene._replace(centre=scene.centre.copy())
     return Approach(
         new_workspace(problem),
         new_search(),
         new_grid(),
         scene,
         new_motion_workspace(scene),
-        new_curve(len(scene.pair)),
+        new_curve(),
         np.empty(3),
         np.zeros(6, np.int64),
         np.zeros(1, np.int64),
@@ -330,7 +330,7 @@ def _follow(
                 outcome = LIMITS
                 break
         if level == NOWHERE:
-            if spline_is_free(problem, approach.work, scene, motion, curve):
+            if spline_is_free(scene, motion, curve):
                 outcome = DONE
                 break
             level, k = curve.blocked[0], curve.blocked[1]
@@ -352,11 +352,16 @@ def _follow(
 
 @inner
 def _first_contact(problem: Problem, approach: Approach, b: int, column: int) -> tuple[int, int]:
-    """Return a level at which the path from a column is in contact, or NOWHERE, and the contact."""
+    """Return a level at which the path from a column is in contact, or NOWHERE, and the contact.
+
+    Until a contact is known, most paths are free, and only their ends are checked.
+    """
     grid = approach.grid
     for n in range(PIECES + 1):
         # The goal, then from the begin of the approach on.
         level = (PIECES + 1 - n) % (PIECES + 1)
+        if 0 < level < PIECES and approach.contact[0] == NO_CONTACT:
+            continue
         i = column_at(grid, b, column, level)
         if grid.is_free[b, level, i]:
             continue

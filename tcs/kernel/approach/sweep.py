@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.kernel.approach.pairs import Approach, approach_pair, follow_posture, new_approach
-from tcs.kernel.approach.scene import place_scene
+from tcs.kernel.approach.scene import approach_scene, place_scene
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.base_pose import environment_in_arm_base, goal_in_arm_base, place_base
 from tcs.kernel.cache import inner, jit
 from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.dexterity.measures import measure_at, rounded_inward
+from tcs.kernel.motion.scene import MotionScene
 from tcs.kernel.motion.straight import DONE
 from tcs.kernel.problem import Problem
 from tcs.kernel.scores import APPROACH_BLOCKED, REACHED
@@ -45,22 +46,31 @@ class ReachedPairs(NamedTuple):
     """Its joint angles [rad], shape (n, 7)."""
 
 
-def score_approaches(problem: Problem, lines: ApproachLines, pairs: ReachedPairs) -> None:
+def score_approaches(
+    problem: Problem, lines: ApproachLines, pairs: ReachedPairs, scene: MotionScene | None = None
+) -> None:
     """Replace the scores of reached pairs by those with approach.
 
     Args:
         problem: The scene, its goals and its grid; an arm with a closed form.
         lines: The approaches of the goals.
         pairs: The scores; replaced.
+        scene: The `approach_scene` of the problem, which takes a tenth of a second to make.
     """
+    scene = approach_scene(problem) if scene is None else scene
     # Other orders in memory are other types, for which the code would be compiled anew.
     pairs = pairs._replace(pair=np.ascontiguousarray(pairs.pair, dtype=np.int64))
     # Allocated here to outlive the call: the compiled code takes unowned views of these arrays.
-    _score_approaches(problem, new_approach(problem), lines, pairs)
+    _score_approaches(problem, new_approach(problem, scene), lines, pairs)
 
 
 def approach_spline(
-    problem: Problem, lines: ApproachLines, configuration: int, goal: int, q: FloatArray
+    problem: Problem,
+    lines: ApproachLines,
+    configuration: int,
+    goal: int,
+    q: FloatArray,
+    scene: MotionScene | None = None,
 ) -> tuple[FloatArray, FloatArray] | None:
     """Return the approach of a posture as a spline in joint space, None if none is found.
 
@@ -70,13 +80,14 @@ def approach_spline(
         configuration: Flat index of the initial configuration.
         goal: Number of the goal.
         q: Joint angles at the goal, free of contact [rad], shape (7,).
+        scene: The `approach_scene` of the problem, which takes a tenth of a second to make.
 
     Returns:
         Joint angles at equal distances of the tool [rad], shape (n, 7), from the begin of the
         approach to the goal, and their derivatives by the fraction of the line [rad]: a cubic
         Hermite spline.
     """
-    approach = new_approach(problem)
+    approach = new_approach(problem, approach_scene(problem) if scene is None else scene)
     posture = np.array(q, dtype=np.float64)
     if _follow_posture(problem, approach, lines, configuration, goal, posture) != DONE:
         return None
@@ -107,7 +118,7 @@ def _follow_posture(
 def _place_surroundings(problem: Problem, approach: Approach, torso: int) -> None:
     """Place everything around the arm, the base being in place."""
     environment_in_arm_base(problem, approach.work, torso)
-    place_scene(problem, approach.work, torso, approach.motion)
+    place_scene(problem, approach.work, torso, approach.scene, approach.motion)
     approach.columns[5] = torso
 
 

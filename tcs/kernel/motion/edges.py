@@ -1,10 +1,10 @@
 """Certified freedom from contact of curves in joint space.
 
-A curve is a cubic Bezier curve of joint angles; a straight edge is one with equally spaced control
-points. A piece of it is certified when, at its middle posture, every pair of shapes is farther
-apart than its gap plus a bound on how far the shapes move on the piece. Other pieces are halved and
-the pairs in question checked again, until all are certified or a pair is in contact. So nothing
-lies between samples, however thin.
+A curve is a sequence of cubic Bezier curves of joint angles; a straight edge is a single one with
+equally spaced control points. A part of it is certified when, at its middle posture, every pair of
+shapes is farther apart than its gap plus a bound on how far the shapes move on the part. Other
+parts are halved and the pairs in question checked again, until all are certified or a pair is in
+contact. So nothing lies between samples, however thin.
 """
 
 from __future__ import annotations
@@ -81,6 +81,7 @@ def certified(owned_scene: MotionScene, owned_work: MotionWorkspace, control: Fl
         control: Control points of the cubic Bezier curve [rad], shape (4, 7).
     """
     scene, work = unowned(owned_scene), unowned(owned_work)
+    work.pieces[0] = 1
     for m in range(4):
         for k in range(7):
             work.control[m, k] = control[m, k]
@@ -127,6 +128,7 @@ def edge_is_certified(
 ) -> bool:
     """Return whether the straight edge between two postures [rad] is certified."""
     control = work.control
+    work.pieces[0] = 1
     for k in range(7):
         step = end[k] - start[k]
         control[0, k], control[3, k] = start[k], end[k]
@@ -141,9 +143,10 @@ def curve_is_free_until(scene: MotionScene, work: MotionWorkspace) -> float:
     moved = 0.0
     for k in range(7):
         moved += work.delta[k] * scene.reach[k]
-    pieces = int(np.ceil(moved / PIECE)) if moved > PIECE else 1
-    for n in range(pieces):
-        begin, end = n / pieces, (n + 1) / pieces
+    # A curve of several pieces is halved as they are.
+    parts = int(np.ceil(moved / PIECE)) if moved > PIECE and work.pieces[0] == 1 else 1
+    for n in range(parts):
+        begin, end = n / parts, (n + 1) / parts
         _take_piece(scene, work, begin, end)
         count = list_near(scene, work, ROUNDING, len(scene.pair))
         until = listed_are_free_until(scene, work, count, begin, end)
@@ -169,7 +172,7 @@ def listed_are_free_until(
     for m in range(count):
         k = work.pairs[m]
         if not is_of_groups(scene, k) and is_near(scene, work, k, False):
-            work.contact[0] = k
+            work.contact[0], work.met[0] = k, 0.5 * (begin + end)
             work.hits[k] += 1
             return begin
     return _halves_are_free_until(scene, work, count, begin, end)
@@ -199,6 +202,7 @@ def _halves_are_free_until(
         first, last = stretch[top, 0], stretch[top, 1]
         left = _uncertified(scene, work, begin, end, first, last)
         if left < 0 or (left > 0 and top + 2 > 2 * DEPTH):
+            work.met[0] = 0.5 * (begin + end)
             work.hits[work.contact[0]] += 1
             return begin
         if left > 0:
@@ -269,13 +273,45 @@ def _take_piece(scene: MotionScene, work: MotionWorkspace, begin: float, end: fl
 
 @inner
 def take_middle(work: MotionWorkspace, begin: float, end: float) -> None:
-    """Fill the posture in the middle of a piece, and how far each joint is from it on the piece."""
-    control, t, half = work.control, 0.5 * (begin + end), 0.5 * (end - begin)
+    """Fill the posture in the middle of a part of the curve, and how far each joint is from it."""
+    control, pieces = work.control, work.pieces[0]
+    first, last = begin * pieces, end * pieces
+    if last - first > 1.0:
+        _take_middle_of_pieces(work, int(first), int(last))
+        return
+    n = min(int(0.5 * (first + last)), pieces - 1)
+    t, half, at = 0.5 * (first + last) - n, 0.5 * (last - first), 3 * n
     u = 1.0 - t
     for k in range(7):
-        a, b, c, d = control[0, k], control[1, k], control[2, k], control[3, k]
+        a, b = control[at, k], control[at + 1, k]
+        c, d = control[at + 2, k], control[at + 3, k]
         work.q[k] = u * u * (u * a + 3.0 * t * b) + t * t * (3.0 * u * c + t * d)
         # The derivatives of the curve lie between multiples of the differences of its points.
         work.delta[k] = 3.0 * half * max(abs(b - a), abs(c - b), abs(d - c))
         work.rate[k] = 3.0 * half * (u * u * (b - a) + 2.0 * u * t * (c - b) + t * t * (d - c))
         work.bend[k] = 6.0 * half * half * max(abs(a - 2.0 * b + c), abs(b - 2.0 * c + d))
+
+
+@inner
+def _take_middle_of_pieces(work: MotionWorkspace, first: int, last: int) -> None:
+    """Do as `take_middle` for an even number of whole pieces of the curve.
+
+    What is left of the curve without its motion at a constant rate is a sequence of Bezier curves
+    too, and lies between their control points.
+
+    Args:
+        work: Holds the curve.
+        first: Number of the first piece.
+        last: One after the last piece.
+    """
+    control, middle = work.control, 3 * ((first + last) // 2)
+    scale = 2.0 / (3.0 * (last - first))
+    for k in range(7):
+        q = control[middle, k]
+        rate = 0.5 * (control[3 * last, k] - control[3 * first, k])
+        delta = beyond = 0.0
+        for m in range(3 * first, 3 * last + 1):
+            along = control[m, k] - q
+            delta = max(delta, abs(along))
+            beyond = max(beyond, abs(along - rate * scale * (m - middle)))
+        work.q[k], work.delta[k], work.rate[k], work.bend[k] = q, delta, rate, 2.0 * beyond

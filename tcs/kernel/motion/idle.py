@@ -29,6 +29,22 @@ def without_idle_pairs(scene: MotionScene) -> MotionScene:
     return with_pairs(scene, needed)
 
 
+def needed_pairs(scene: MotionScene, robot: int) -> BoolArray:
+    """Return which pairs are needed, shape (n_pairs,): all but idle ones of the robot's own shapes.
+
+    Args:
+        scene: A scene without groups.
+        robot: Number of the first body of the robot in `scene.body`.
+    """
+    own = scene.body[scene.pair[:, 1]] >= robot
+    among = with_pairs(scene, own)
+    needed = np.ones(len(among.pair), np.bool_)
+    list_needed(among, new_motion_workspace(among), needed)
+    every = np.ones(len(scene.pair), np.bool_)
+    every[own] = needed
+    return every
+
+
 @jit
 def list_needed(owned_scene: MotionScene, owned_work: MotionWorkspace, needed: BoolArray) -> None:
     """Fill which pairs can touch as far as the joints between their shapes decide.

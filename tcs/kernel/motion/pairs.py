@@ -138,8 +138,11 @@ def list_near(scene: MotionScene, work: MotionWorkspace, extra: float, most: int
         first, moving, last = scene.first_pair[i], scene.first_moving[i], scene.first_pair[i + 1]
         while first < moving and count < most:
             end = min(first + GROUP, moving)
-            if _any_overlap(scene, work, i, first, end, work.motion[i, 0] + extra):
-                count = _append_near(scene, work, first, end, extra, count, most)
+            apart = work.motion[i, 0] + extra
+            if _any_overlap(scene, work, i, first, end, apart):
+                for k in range(first, end):
+                    if count < most and _overlaps(scene, work, i, k, apart):
+                        count = _append_near(scene, work, k, k + 1, extra, count, most)
             first = end
         if count < most:
             count = _append_near(scene, work, moving, last, extra, count, most)
@@ -173,6 +176,19 @@ def _any_overlap(
         apart = bound[n] + gap[n] + extra
         overlaps += int(dx * dx + dy * dy + dz * dz < apart * apart)
     return overlaps > 0
+
+
+@inner
+def _overlaps(scene: MotionScene, work: MotionWorkspace, i: int, k: int, extra: float) -> bool:
+    """Return whether pair k, of shape i and a fixed one, is as `_any_overlap` says of some."""
+    shapes, centre = work.shapes, scene.centre
+    dx, dy, dz = (
+        centre[0, k] - shapes[i, CENTRE],
+        centre[1, k] - shapes[i, CENTRE + 1],
+        centre[2, k] - shapes[i, CENTRE + 2],
+    )
+    apart = scene.bound[k] + scene.gap[k] + extra
+    return dx * dx + dy * dy + dz * dz < apart * apart
 
 
 @inner

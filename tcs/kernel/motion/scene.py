@@ -13,6 +13,8 @@ from tcs.kernel.problem import Problem
 FULL_TURN = 2.0 * np.pi
 STACK = 256
 """Capacity of a stack of pairs: two for each level of the trees of both shapes."""
+MOST_PIECES = 16
+"""Greatest number of pieces of a curve, a power of two."""
 DEPTH = 40
 """Greatest number of halvings of a curve: 2^-40 of any motion is below RESOLUTION of `edges`."""
 
@@ -100,7 +102,12 @@ class MotionWorkspace(NamedTuple):
     twist: FloatArray
     """Motion of the links 0 .. 7 on half of the current piece, see `planes`, shape (8, 6)."""
     control: FloatArray
-    """Control points of the current curve [rad], shape (4, 7)."""
+    """Control points of the pieces of the current curve, cubic Bezier curves, the last one of each
+    being the first one of the next [rad], shape (3 * MOST_PIECES + 1, 7)."""
+    pieces: IntArray
+    """Number of these pieces, a power of two, shape (1,)."""
+    met: FloatArray
+    """Where on the curve the pair `contact` blocks it, in [0, 1], shape (1,)."""
     pairs: IntArray
     """Stack of lists of pairs that are not certified yet, shape (DEPTH * n_pairs,)."""
     stack: IntArray
@@ -270,7 +277,9 @@ def new_motion_workspace(scene: MotionScene) -> MotionWorkspace:
         rate=np.zeros(7),
         bend=np.zeros(7),
         twist=np.zeros((8, 6)),
-        control=np.empty((4, 7)),
+        control=np.empty((3 * MOST_PIECES + 1, 7)),
+        pieces=np.ones(1, np.int64),
+        met=np.zeros(1),
         pairs=np.empty((DEPTH + 1) * pairs, np.int64),
         stack=np.empty(STACK, np.int64),
         span=np.empty((2 * DEPTH, 2)),

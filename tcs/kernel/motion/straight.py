@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.cache import inner, jit
+from tcs.kernel.cache import inner, int_constant, jit
 from tcs.kernel.kinematics import fill_jacobian, link_poses, place_tool, pose_error
 from tcs.kernel.motion.edges import curve_is_free_until
-from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
+from tcs.kernel.motion.scene import MOST_PIECES, MotionScene, MotionWorkspace
 from tcs.kernel.numeric.newton import (
     NewtonWorkspace,
     factorise,
@@ -32,6 +32,7 @@ the branch."""
 OFF_LINE = 5e-4
 """Greatest error of the spline between its points [rad and m]; it is above 1e-5 next to
 singularities, and where a joint arrives at its limit."""
+ONE = int_constant(1)
 MOST_LOCKED = 1
 """Number of joints that may rest at a limit: a pose takes six."""
 
@@ -118,21 +119,45 @@ def straight_motion(
         take_piece(work, points, tangents, n)
         if error_between(scene, work, line, offset, (n + 0.5) / last) > OFF_LINE:
             return LIMITS
-    for n in range(last):
-        take_piece(work, points, tangents, n)
+    first = 0
+    while first < last:
+        count = MOST_PIECES
+        while count > last - first:
+            count //= 2
+        take_pieces(work, points, tangents, first, count)
         if curve_is_free_until(scene, work) < 1.0:
             return BLOCKED
+        first += count
     return DONE
+
+
+@inner
+def take_pieces(
+    work: MotionWorkspace, points: FloatArray, tangents: FloatArray, first: int, count: int
+) -> None:
+    """Make some pieces of a spline the current curve.
+
+    Args:
+        work: `control` and `pieces` are filled.
+        points: Joint angles [rad], shape (n + 1, 7).
+        tangents: Their derivatives by the fraction of the spline [rad], shape (n + 1, 7).
+        first: Number of the first piece.
+        count: Number of pieces, a power of two.
+    """
+    control, third = work.control, 1.0 / (3.0 * (len(points) - 1))
+    work.pieces[0] = count
+    for m in range(count):
+        n, at = first + m, 3 * m
+        for k in range(7):
+            control[at, k], control[at + 3, k] = points[n, k], points[n + 1, k]
+            control[at + 1, k] = points[n, k] + third * tangents[n, k]
+            control[at + 2, k] = points[n + 1, k] - third * tangents[n + 1, k]
 
 
 @inner
 def take_piece(work: MotionWorkspace, points: FloatArray, tangents: FloatArray, n: int) -> None:
     """Make piece n of a spline the current curve."""
-    third = 1.0 / (3.0 * (len(points) - 1))
-    for k in range(7):
-        work.control[0, k], work.control[3, k] = points[n, k], points[n + 1, k]
-        work.control[1, k] = points[n, k] + third * tangents[n, k]
-        work.control[2, k] = points[n + 1, k] - third * tangents[n + 1, k]
+    take_pieces(work, points, tangents, n, ONE)
 
 
 @inner

@@ -106,6 +106,7 @@ def score_with_approach(
     Returns:
         Arm joints of the pairs that remain reached [rad].
     """
+    from tcs.kernel.approach.scene import approach_scene
     from tcs.kernel.approach.sweep import ReachedPairs, score_approaches
 
     found_pairs = (
@@ -113,6 +114,7 @@ def score_with_approach(
     )
     pairs = np.concatenate([np.empty((0, 2), np.int64), *found_pairs])
     rows, columns = pairs.T
+    scene = approach_scene(problem)
 
     def part(start: int) -> ReachedPairs:
         chosen = slice(start, start + SLICE)
@@ -121,7 +123,7 @@ def score_with_approach(
             pairs[chosen], reason[at], contact[at].astype(np.int32), dexterity[at],
             joints[chosen].copy(),
         )  # fmt: skip
-        score_approaches(problem, lines, scores)
+        score_approaches(problem, lines, scores, scene)
         return scores
 
     found = Parallel(n_jobs=jobs, prefer="threads")(

@@ -20,7 +20,7 @@ SAMPLES = 60
 def judge(owned_scene, owned_work, control, plane, meets):
     """Fill between which pairs a plane is on a whole curve, and which are near at samples of it."""
     scene, work = unowned(owned_scene), unowned(owned_work)
-    work.control[:] = control
+    work.control[:4] = control
     take_middle(work, 0.0, 1.0)
     take_posture(scene, work)
     take_twists(work)
