@@ -20,7 +20,8 @@ SAMPLES = 60
 def judge(owned_scene, owned_work, control, plane, meets):
     """Fill between which pairs a plane is on a whole curve, and which are near at samples of it."""
     scene, work = unowned(owned_scene), unowned(owned_work)
-    work.control[:4] = control
+    work.control[: len(control)] = control
+    work.pieces[0] = len(control) // 3
     take_middle(work, 0.0, 1.0)
     take_posture(scene, work)
     take_twists(work)
@@ -38,8 +39,10 @@ def judge(owned_scene, owned_work, control, plane, meets):
             meets[k] |= is_near(scene, work, k, False)
 
 
-@pytest.mark.parametrize("bent", [0.0, 0.1], ids=["straight", "bent"])
-def test_shapes_with_a_plane_between_them_do_not_meet(rng, bent):
+@pytest.mark.parametrize(
+    ("pieces", "bent"), [(1, 0.0), (1, 0.1), (4, 0.03)], ids=["straight", "bent", "of four pieces"]
+)
+def test_shapes_with_a_plane_between_them_do_not_meet(rng, pieces, bent):
     chain = drake_arm("pr2 left").chain
     planes = tight = 0
     for seed in range(3):
@@ -48,8 +51,8 @@ def test_shapes_with_a_plane_between_them_do_not_meet(rng, bent):
         for _ in range(80):
             start = within_limits(rng, chain)
             step = rng.normal(size=7) * 0.3
-            control = start + np.linspace(0.0, 1.0, 4)[:, None] * step
-            control[1:3] += bent * rng.normal(size=(2, 7))
+            control = start + np.linspace(0.0, 1.0, 3 * pieces + 1)[:, None] * step
+            control[1:-1] += bent * rng.normal(size=(3 * pieces - 1, 7))
             meets[:] = False
             judge(scene, work, control, plane, meets)
             assert not np.any(plane & meets)
