@@ -4,9 +4,9 @@ Usage: python benchmarks/motions.py FILE [FILE ...] [--most N] [--sample N] [--j
 
 All pairs of configuration and goal that a score file reaches in its nominal table are examined, or
 those of a sample of the configurations: from rest to the approach, straight in, out and back.
-Processor times are those of the whole process. A row whose motion file lies beside its score file,
-as the benchmark leaves it, is not examined again, so that an interrupted run continues; delete the
-files to begin anew.
+Times include preparing the row; those of the processor are of the whole process. A row whose motion
+file lies beside its score file, as the benchmark leaves it, and is of as many pairs, is not examined
+again, so that an interrupted run continues; delete the files to begin anew.
 """
 
 from __future__ import annotations
@@ -58,7 +58,10 @@ def main() -> int:
 def examined(path: Path, file: tcs.ScoreFile, options: argparse.Namespace) -> MotionFile:
     """Return the motions of a row: those beside its score file, or else planned and saved there."""
     if motion_path(path).exists():
-        return motions_of(file, path)
+        kept = motions_of(file, path)
+        asked = {"within": None, "most": options.most, "sample": options.sample}
+        if all(kept.metadata[key] == value for key, value in asked.items()):
+            return kept
     motions = tcs.examine(
         file,
         within=None,
@@ -82,6 +85,7 @@ def report(name: str, found: dict) -> None:
         "approach at limits": f"{reasons['approach_limits'] / pairs:.1%}",
         "approach blocked": f"{(reasons['approach_blocked'] + reasons['unreached']) / pairs:.1%}",
         "no path": f"{reasons['no_path'] / pairs:.1%}",
+        "time [s]": f"{found['seconds']:.0f}",
         "processor time [s]": f"{found['processor_seconds']:.0f}",
     }
     for column, text in cells.items():

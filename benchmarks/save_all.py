@@ -47,7 +47,7 @@ PARTS: dict[str, tuple[str, ...]] = {
                 *("scratching_thigh_left-bed", "scratching_thigh_right-bed"),
             )
         ),
-        *("--sample", "300", "--jobs", "1"),
+        *("--jobs", "2"),
     ),
     "isotropy_bound": (),
     "optimum": ("--compared", "all"),
