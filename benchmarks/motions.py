@@ -4,9 +4,9 @@ Usage: python benchmarks/motions.py FILE [FILE ...] [--most N] [--sample N] [--j
 
 All pairs of configuration and goal that a score file reaches in its nominal table are examined, or
 those of a sample of the configurations: from rest to the approach, straight in, out and back.
-Times include preparing the row; those of the processor are of the whole process. A row whose motion
-file lies beside its score file, as the benchmark leaves it, and is of as many pairs, is not examined
-again, so that an interrupted run continues; delete the files to begin anew.
+Times include preparing the row; those of the processor are of the whole process. A row whose
+motion file lies beside its score file, as the benchmark leaves it, and is of as many pairs, is not
+examined again, so that an interrupted run continues; delete the files to begin anew.
 """
 
 from __future__ import annotations
