@@ -10,9 +10,10 @@ from tcs.kernel.motion.edges import certified
 from tcs.motion.curves import Curve
 from tcs.motion.stops import Stop
 
-ITERATIONS = 1600
-"""Greatest number of random postures that the planner grows towards: less than a tenth of a second
-among a hundred shapes."""
+ITERATIONS = 20_000
+"""Greatest number of random postures that the planner grows towards. Of the PR2's goals that a path
+leads to, one in a hundred takes more than a tenth of these: goals of a single posture beside the
+person's arm."""
 SHORTCUTS = 60
 """Number of random shortcuts that are tried."""
 WIDEST_CORNER = 0.3

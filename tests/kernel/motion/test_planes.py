@@ -40,9 +40,11 @@ def judge(owned_scene, owned_work, control, plane, meets):
 
 
 @pytest.mark.parametrize(
-    ("pieces", "bent"), [(1, 0.0), (1, 0.1), (4, 0.03)], ids=["straight", "bent", "of four pieces"]
+    ("pieces", "bent", "back"),
+    [(1, 0.0, 0.0), (1, 0.1, 0.0), (4, 0.03, 0.0), (1, 0.0, 0.15), (4, 0.0, 0.15)],
+    ids=["straight", "bent", "of four pieces", "out and back", "of four pieces, out and back"],
 )
-def test_shapes_with_a_plane_between_them_do_not_meet(rng, pieces, bent):
+def test_shapes_with_a_plane_between_them_do_not_meet(rng, pieces, bent, back):
     chain = drake_arm("pr2 left").chain
     planes = tight = 0
     for seed in range(3):
@@ -50,8 +52,12 @@ def test_shapes_with_a_plane_between_them_do_not_meet(rng, pieces, bent):
         plane, meets = np.zeros((2, len(scene.pair)), np.bool_)
         for _ in range(80):
             start = within_limits(rng, chain)
-            step = rng.normal(size=7) * 0.3
-            control = start + np.linspace(0.0, 1.0, 3 * pieces + 1)[:, None] * step
+            step = rng.normal(size=7) * (back or 0.3)
+            along = np.linspace(0.0, 1.0, 3 * pieces + 1)[:, None]
+            if back:
+                # The middle is where the curve turns: to first order, nothing moves.
+                along = np.minimum(along, 1.0 - along)
+            control = start + along * step
             control[1:-1] += bent * rng.normal(size=(3 * pieces - 1, 7))
             meets[:] = False
             judge(scene, work, control, plane, meets)
