@@ -103,7 +103,7 @@ def plan(
         members = _flat_indices(loaded, nearest_table(loaded, None, settings).index, configuration)
     else:
         shown = ShownSet.of(loaded, state, max_members, settings)
-        members = _flat_indices(loaded, shown.table, shown.indices)
+        members = shown.refined or _flat_indices(loaded, shown.table, shown.indices)
     with terminal.progress_bar("stops") as on_progress:
         found = tcs.plan(
             loaded,

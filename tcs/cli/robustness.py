@@ -58,11 +58,11 @@ def evaluate(
     select: Annotated[
         str,
         typer.Option(
-            metavar="best|single|robust|uniform|equal",
+            metavar="best|single|robust|refined|uniform|equal",
             help="Set to evaluate: the best set, the best single configuration, the most robust "
-            "set (greatest lower confidence bound on success, by `tcs robustify`), or another set "
-            "in each sample, drawn from all with P_R of at least 98 % of the greatest (uniform) or "
-            "equal to it (equal).",
+            "set (greatest lower confidence bound on success, by `tcs robustify`), the best "
+            "refined set (by `tcs refine`), or another set in each sample, drawn from all with P_R "
+            "of at least 98 % of the greatest (uniform) or equal to it (equal).",
         ),
     ] = "best",
     members: Annotated[
@@ -95,6 +95,21 @@ def evaluate(
 
     loaded = tcs.load(file)
     table = table_of(loaded, observed)
+    if select == "refined":
+        from tcs.placement.refinement import evaluate_refined
+
+        found = evaluate_refined(
+            loaded,
+            samples=1000 if samples is None else samples,
+            seed=seed,
+            errors=errors,
+            table=table,
+            body_collisions="all" if check_base else body_collisions,
+            jobs=jobs,
+            on_compile=terminal.note_compiling,
+        )
+        terminal.print_result(found.to_json(), robustness_tables.report_evaluation, as_json=as_json)
+        return
     with terminal.progress_bar("configurations in samples") as on_progress:
         found = tcs.evaluate(
             loaded,

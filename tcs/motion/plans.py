@@ -19,6 +19,7 @@ from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.rebuild import made_from, rebuild_scene
 from tcs.placement.selection import Choice
 from tcs.placement.store import ScoreFile, file_of_arm
+from tcs.placement.tables import RefinedSet
 
 ENTRY = "motion.connect.connect"
 """The function of the planner that takes longest to compile."""
@@ -26,7 +27,7 @@ ENTRY = "motion.connect.connect"
 
 def plan(
     file: ScoreFile,
-    members: Choice | Sequence[int] | InitialConfiguration,
+    members: Choice | RefinedSet | Sequence[int] | InitialConfiguration,
     *,
     order: str = "best",
     seed: int = 0,
@@ -41,9 +42,10 @@ def plan(
 
     Args:
         file: A score file.
-        members: A selected set, or flat configuration indices of the stops in the order of the
-            visits; in a file with observed states, those of all its tables one after the other. Or
-            one initial configuration, on or off the grid, from which every goal is tried.
+        members: A selected set, on or off the grid; a refined set; or flat configuration indices
+            of the stops in the order of the visits, in a file with observed states those of all its
+            tables one after the other. Or one initial configuration, on or off the grid, from which
+            every goal is tried.
         order: Order of the goals at a stop: "best" for the shortest tour, "given" for their own.
         seed: Seed of the planner; the plan is the same for the same seed.
         on_progress: Called with the number of finished stops and their total.
@@ -163,7 +165,7 @@ Place = tuple[int | None, list[float]]
 
 
 def _places(
-    file: ScoreFile, job: Job, members: Choice | Sequence[int] | InitialConfiguration
+    file: ScoreFile, job: Job, members: Choice | RefinedSet | Sequence[int] | InitialConfiguration
 ) -> tuple[list[Place], list[list[int]]]:
     """Return the stops, and for each goal the numbers of those to try it from, the best first."""
     axes = job.scored_grid.axes
@@ -172,7 +174,11 @@ def _places(
         return [(None, values)], [[0]] * len(job.task.goals)
     if isinstance(members, Choice):
         table = 0 if members.match is None else members.match.index
+        if members.refined is not None:
+            return _refined_places(file, job, RefinedSet(table, members.refined, members.order))
         members = [table * job.grid.size + members.indices[i] for i in members.order]
+    if isinstance(members, RefinedSet):
+        return _refined_places(file, job, members)
     for h in members:
         if not 0 <= h < job.scored_grid.size:
             raise TcsError(
@@ -183,6 +189,35 @@ def _places(
         (h, [float(of_axes[axis.name][row]) for axis in axes]) for row, h in enumerate(members)
     ]
     return places, _serving(file, job, members)
+
+
+def _refined_places(
+    file: ScoreFile, job: Job, chosen: RefinedSet
+) -> tuple[list[Place], list[list[int]]]:
+    """Return the stops of a refined set, as `_places` does.
+
+    Raises:
+        TcsError: If the file has no such set.
+    """
+    refined = file.tables[chosen.table].refined
+    if refined is None or not 0 <= chosen.row < len(refined.origin):
+        raise TcsError(f"plan: no refined set {chosen.row}. Refine the file: tcs refine FILE.")
+    observed = file.observed_states[chosen.table]
+    names = [axis.name for axis in file.configurations.axes]
+    places: list[Place] = []
+    for i in chosen.order:
+        known = {
+            **observed,
+            **dict(zip(names, refined.values[chosen.row, i].tolist(), strict=True)),
+        }
+        places.append((None, [float(known[axis.name]) for axis in job.scored_grid.axes]))
+    rows = list(chosen.order)
+    reached, dexterity = refined.reached[chosen.row, rows], refined.dexterity[chosen.row, rows]
+    serving = [
+        sorted(np.flatnonzero(reached[:, goal]).tolist(), key=lambda n, g=goal: -dexterity[n, g])
+        for goal in range(reached.shape[1])
+    ]
+    return places, serving
 
 
 def exact_state(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from tcs.errors import SelectionError
 from tcs.placement.store import ScoreFile
+from tcs.placement.tables import RefinedSet
 from tcs.service.conversions import (
     constraints_of,
     observed_of,
@@ -192,7 +193,9 @@ class SceneWork:
             "file_bytes": entry.bytes,
         }
 
-    def _stops(self, file: ScoreFile, request: PlanRequest) -> Sequence[int] | InitialConfiguration:
+    def _stops(
+        self, file: ScoreFile, request: PlanRequest
+    ) -> Sequence[int] | InitialConfiguration | RefinedSet:
         """Return the stops of a plan, as `tcs plan` chooses them."""
         from tcs.motion.plans import exact_state
         from tcs.output.report.shown_set import ShownSet
@@ -208,6 +211,8 @@ class SceneWork:
         table, indices = table_of(file, request), tuple(request.configuration)
         if not indices:
             shown = ShownSet.of(file, here, request.max_members, observed)
+            if shown.refined is not None:
+                return shown.refined
             table, indices = shown.table, shown.indices
         size = file.configurations.size
         for h in indices:

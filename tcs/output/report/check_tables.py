@@ -35,7 +35,7 @@ def success_table(report: ScoreReport) -> Table | None:
     if success is None:
         return None
     sets = report.scored.sets
-    named = [("the set shown here", tuple(sorted(report.shown.indices)))]
+    named = [("the set shown here", report.shown.stored)]
     named += [
         (f"most robust set of {'one' if most == 1 else f'up to {most}'}", members)
         for most in range(1, success.members.shape[1] + 1)

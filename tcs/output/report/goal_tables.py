@@ -85,7 +85,7 @@ def joints_table(report: ScoreReport) -> Table:
     for goal, number in enumerate(report.assignment):
         if number is None:
             continue
-        joints = report.scored.scores.joints_of(report.shown.indices[number], goal)
+        joints = report.shown.scores.joints_of(report.shown.rows[number], goal)
         if joints is not None:
             angles = (f"{math.degrees(q):.2f}" for q in joints[-len(arm_joints) :].tolist())
             rows.append([str(goal), str(number + 1), *angles])

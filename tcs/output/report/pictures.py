@@ -161,9 +161,9 @@ def _member_panel(
 ) -> ScenePanel:
     """Return the panel of one member: robot and person, or a close view of the tool at its goal."""
     job, scene = scored
-    member, h = shown.members[number], shown.indices[number]
-    scores = file.tables[shown.table].scores
-    served = assigned_goals(assign_goals(scores, shown.indices), number)
+    member, h = shown.members[number], shown.rows[number]
+    scores = shown.scores
+    served = assigned_goals(assign_goals(scores, shown.rows), number)
     current = max(served, key=lambda g: float(scores.dexterity[h, g]), default=None)
     _set_environment(scene, member)
     scene.place_base(member.base_x, member.base_y, member.base_yaw)

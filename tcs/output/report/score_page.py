@@ -165,7 +165,7 @@ def _success(report: ScoreReport) -> list[Block]:
         ),
         table,
     ]
-    members = tuple(sorted(report.shown.indices))
+    members = report.shown.stored
     if members and report.success is not None and report.success.row_of(members) is None:
         blocks.append(
             Text(

@@ -21,7 +21,7 @@ from tcs.output.words import assign_goals
 from tcs.placement.reasons import Distribution, Explanation, explain
 from tcs.placement.scoring import Job, Verification, verify
 from tcs.placement.scoring.drake_check import DEXTERITY_BAR, Finding
-from tcs.placement.scoring.verify import check_pairs
+from tcs.placement.scoring.verify import check_pairs, check_refined
 from tcs.placement.store import ScoreFile, StateTables, load_scores
 from tcs.placement.tables import Reason, SuccessTable
 
@@ -107,9 +107,7 @@ class ScoreReport:
     @property
     def scores(self) -> tuple[float, float]:
         """P_R and P_M of the set; zeros if it has no member."""
-        if not self.shown.indices:
-            return (0.0, 0.0)
-        return self.scored.sets.scores_of(tuple(sorted(self.shown.indices)))
+        return self.shown.reachability, self.shown.manipulability
 
     @property
     def success(self) -> SuccessTable | None:
@@ -119,7 +117,7 @@ class ScoreReport:
     @cached_property
     def results(self) -> tuple[tuple[GoalResult, ...], ...]:
         """The result of each member at each goal."""
-        scores = self.scored.scores
+        scores = self.shown.scores
         return tuple(
             tuple(
                 GoalResult(
@@ -129,7 +127,7 @@ class ScoreReport:
                 )
                 for g in range(self.goals)
             )
-            for h in self.shown.indices
+            for h in self.shown.rows
         )
 
     @property
@@ -149,7 +147,7 @@ class ScoreReport:
     @cached_property
     def assignment(self) -> tuple[int | None, ...]:
         """Number of the member that serves each goal, from 0; None where no member reaches it."""
-        return assign_goals(self.scored.scores, self.shown.indices)
+        return assign_goals(self.shown.scores, self.shown.rows)
 
     @cached_property
     def distributions(self) -> tuple[Distribution, ...]:
@@ -181,7 +179,7 @@ class ScoreReport:
 
     def explanation(self, goal: int) -> Explanation:
         """Return what would have to change for the set to reach a goal."""
-        from_where = self.shown.indices[0] if self.shown.indices else None
+        from_where = self.shown.members[0] if self.shown.members else None
         observed = self.file.observed_states[self.shown.table]
         return explain(self.file, goal, from_where, observed=observed or None)
 
@@ -217,11 +215,17 @@ def make_score_report(
     shown = ShownSet.of(file, here, max_members, observed)
     scored = scored_scene(file, shown)
     served = {
-        goal: shown.indices[number]
-        for goal, number in enumerate(assign_goals(file.tables[shown.table].scores, shown.indices))
+        goal: shown.rows[number]
+        for goal, number in enumerate(assign_goals(shown.scores, shown.rows))
         if number is not None
     }
-    findings = check_pairs(file, shown.table, [(h, goal) for goal, h in served.items()])
+    pairs = [(h, goal) for goal, h in served.items()]
+    if shown.refined is None:
+        findings = check_pairs(file, shown.table, pairs)
+    else:
+        order = shown.refined.order
+        of_members = [(order[i], goal) for i, goal in pairs]
+        findings = check_refined(file, shown.table, shown.refined.row, of_members)
     return ScoreReport(
         path=path,
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
@@ -250,7 +254,7 @@ def make_score_report(
 def _tours(file: ScoreFile, shown: ShownSet, scored: ScoredScene) -> Tours:
     """Plan the motions of a set, and measure their clearances."""
     first = shown.table * scored.job.grid.size
-    planned = plan(file, [first + index for index in shown.indices])
+    planned = plan(file, shown.refined or [first + index for index in shown.indices])
     before = scored.scene.positions()
     tours = Tours.of(planned, scored.scene)
     scored.scene.restore(before)

@@ -121,7 +121,8 @@ def _soundness(report: ScoreReport) -> str:
 def _success(report: ScoreReport) -> list[str]:
     """Return the estimated success of the set under error, if there is an estimate."""
     success = report.success
-    row = success.row_of(tuple(sorted(report.shown.indices))) if success is not None else None
+    members = report.shown.stored
+    row = success.row_of(members) if success is not None and members else None
     if success is None or row is None:
         return []
     low, high = percent(float(success.low[row])), percentage(float(success.high[row]))

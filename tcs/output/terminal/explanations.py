@@ -20,6 +20,7 @@ from tcs.output.words import (
     goal_list,
     goal_text,
     goals_text,
+    member_text,
     pair_text,
     reason_of,
     settings_text,
@@ -66,6 +67,7 @@ def _print_explained(out: Console, result: Mapping[str, Any]) -> None:
         out.print(f"The nearest scored configuration is {number}; it differs by {offset}.")
     if explained["reached"]:
         out.print(f"It is reached from {name}, {result['measure']} {explained['dexterity']:.3f}.")
+        _print_refined(out, result)
         return
     pair = ""
     if explained["pair"] is not None:
@@ -78,6 +80,19 @@ def _print_explained(out: Console, result: Mapping[str, Any]) -> None:
     if reaching:
         members = " and ".join(str(h) for h in reaching)
         out.print(f"The best set reaches it from configuration {members}.")
+    _print_refined(out, result)
+
+
+def _print_refined(out: Console, result: Mapping[str, Any]) -> None:
+    """Print whether the best refined set reaches the goal, if there is one."""
+    refined = result["refined_set"]
+    if refined is None:
+        return
+    if not refined["reaching"]:
+        out.print("The best refined set, between the grid points, does not reach it.")
+        return
+    members = " and ".join(member_text(refined["members"][i]) for i in refined["reaching"])
+    out.print(f"The best refined set, between the grid points, reaches it from {members}.")
 
 
 def _print_fix(out: Console, result: Mapping[str, Any]) -> None:

@@ -37,6 +37,8 @@ class ViewState:
     """Quantity that the floor shows."""
     member: int
     """Number of the member of the set that was shown last."""
+    is_member: bool = False
+    """Whether this member is shown: off the grid, no sliders say so."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -128,7 +130,7 @@ class Controls:
             return dataclasses.replace(state, colouring=self._colourings[step])
         along = list(state.along)
         along[self._axes[name][0]] = step
-        return dataclasses.replace(state, along=tuple(along))
+        return dataclasses.replace(state, along=tuple(along), is_member=False)
 
     def clicked(self, state: ViewState, name: str) -> ViewState:
         """Return the state after a button was clicked.
@@ -149,6 +151,8 @@ class Controls:
 
     def index(self, state: ViewState) -> int:
         """Return the flat index of the configuration."""
+        if state.is_member:
+            return self._viewed.members[state.member]
         return int(self._viewed.grid.flat(state.along))
 
     def environment_state(self, state: ViewState) -> int:
@@ -165,12 +169,12 @@ class Controls:
     def _at_member(self, state: ViewState, number: int) -> ViewState:
         """Return the state at a member; a goal it does not reach is replaced by one it serves."""
         index = self._viewed.members[number]
-        along = tuple(self._viewed.grid.indices(index).tolist())
+        along = tuple(self._viewed.grid.indices(self._viewed.on_grid(index)).tolist())
         goal = state.goal
-        if not self._viewed.scores.reached[index, goal]:
-            reached = self._viewed.result(index).reached
+        reached = self._viewed.result(index).reached
+        if goal not in reached:
             goal = (*self._viewed.served(number), *reached, goal)[0]
-        return dataclasses.replace(state, along=along, member=number, goal=goal)
+        return dataclasses.replace(state, along=along, member=number, goal=goal, is_member=True)
 
 
 def label_of(axis: Axis) -> str:

@@ -175,7 +175,7 @@ class SceneObjects(SceneShapes):
 
     def set_up(self, meshcat: Meshcat, arrows: Iterable[Arrow], *, compact: bool = False) -> None:
         """Add all objects to Meshcat, without poses: see `draw`."""
-        members = (self._viewed.grid.configuration(index) for index in self._viewed.members)
+        members = (self._viewed.configuration(index) for index in self._viewed.members)
         self.draw(meshcat, arrows, members, compact=compact)
 
 

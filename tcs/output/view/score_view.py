@@ -58,7 +58,7 @@ def make_score_view(
     """
     shown = ShownSet.of(file, here, max_members, observed)
     job, scene = scored_scene(file, shown, meshes=meshes)
-    viewed = ViewedSet.of(file, shown.table, shown.indices)
+    viewed = ViewedSet.of(file, shown)
     return ScoreView(
         viewed=viewed,
         objects=SceneObjects(scene, job.task, viewed, meshes=meshes),
@@ -88,12 +88,11 @@ def write_score_view(view: ScoreView, path: Path) -> dict[str, Any]:
     ).encode()
     with whole_file(path, "Page") as stream:
         stream.write(text)
-    grid = view.viewed.grid
     return {
         "file": str(path),
         "bytes": len(text),
         "meshes": view.meshes,
-        "members": [grid.configuration(index).to_json() for index in view.viewed.members],
+        "members": [view.viewed.configuration(index).to_json() for index in view.viewed.members],
         "source": view.source if view.meshes else None,
     }
 

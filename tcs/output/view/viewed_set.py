@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.model.grid import Grid, InitialConfiguration
+from tcs.output.report.shown_set import ShownSet
 from tcs.output.words import (
     REASON_NAMES,
     REASON_TEXTS,
@@ -19,6 +20,7 @@ from tcs.output.words import (
     goals_by_reason,
     pair_text,
 )
+from tcs.placement.refinement import RefinedMembers
 from tcs.placement.store import ScoreFile
 from tcs.placement.tables import Reason, ScoreTable, SuccessTable
 from tcs.placement.tables.equations import tc_manipulability, tc_reachability
@@ -85,12 +87,37 @@ class ViewedSet:
     """Flat indices of the set in the order of the tour; empty if no goal is reached."""
     success: SuccessTable | None
     """Estimated success under error, if the file holds estimates."""
+    refined: RefinedMembers | None = None
+    """The members of a refined set: after the configurations of the grid, they have the flat
+    indices from `grid.size`."""
+    origin: tuple[int, ...] = ()
+    """Flat indices of the configurations of the grid that they were refined from."""
 
     @classmethod
-    def of(cls, file: ScoreFile, table: int, members: tuple[int, ...]) -> ViewedSet:
-        """Return a set of a state table of a file."""
-        found = file.tables[table]
-        return cls(Grid.from_dict(file.grid), found.scores, members, found.success)
+    def of(cls, file: ScoreFile, shown: ShownSet) -> ViewedSet:
+        """Return the set of a score file that is shown."""
+        found, grid = file.tables[shown.table], Grid.from_dict(file.grid)
+        if shown.refined is None:
+            return cls(grid, found.scores, shown.indices, found.success)
+        members = tuple(grid.size + i for i in range(len(shown.members)))
+        refined = RefinedMembers(shown.members, shown.scores)
+        return cls(grid, found.scores, members, found.success, refined, shown.indices)
+
+    def configuration(self, index: int) -> InitialConfiguration:
+        """Return a configuration of the grid, or a member of a refined set."""
+        if self.refined is not None and index >= self.grid.size:
+            return self.refined.members[index - self.grid.size]
+        return self.grid.configuration(index)
+
+    def on_grid(self, index: int) -> int:
+        """Return the configuration of the grid that a member was refined from, or itself."""
+        return self.origin[index - self.grid.size] if index >= self.grid.size else index
+
+    def _row(self, index: int) -> tuple[ScoreTable, int]:
+        """Return the scores that hold a configuration, and its row in them."""
+        if self.refined is not None and index >= self.grid.size:
+            return self.refined.scores, index - self.grid.size
+        return self.scores, index
 
     @property
     def goals(self) -> int:
@@ -106,24 +133,25 @@ class ViewedSet:
         Raises:
             GridError: If there is no configuration of that index.
         """
-        scores, configuration = self.scores, self.grid.configuration(index)
+        (scores, row), configuration = self._row(index), self.configuration(index)
         names = scores.pair_names
         return ConfigurationResult(
             index=index,
             configuration=configuration,
-            reasons=tuple(Reason(code) for code in scores.reason[index]),
-            pairs=tuple(names[i] if i >= 0 else None for i in scores.pair[index].tolist()),
-            reachability=float(tc_reachability(scores.reached[index], scores.weights)),
-            manipulability=float(tc_manipulability(scores.dexterity[index], scores.weights)),
+            reasons=tuple(Reason(code) for code in scores.reason[row]),
+            pairs=tuple(names[i] if i >= 0 else None for i in scores.pair[row].tolist()),
+            reachability=float(tc_reachability(scores.reached[row], scores.weights)),
+            manipulability=float(tc_manipulability(scores.dexterity[row], scores.weights)),
         )
 
     def joints(self, index: int, goal: int) -> NDArray[np.float32] | None:
         """Return the stored arm joints [rad] at a goal, shape (7,); None where not reached."""
-        return self.scores.joints_of(index, goal)
+        scores, row = self._row(index)
+        return scores.joints_of(row, goal)
 
     def environment_state(self, index: int) -> int:
         """Return the number of a configuration's environment state, in C order over its axes."""
-        return index // (self.grid.size // math.prod(self.grid.environment_shape))
+        return self.on_grid(index) // (self.grid.size // math.prod(self.grid.environment_shape))
 
     def served(self, number: int) -> tuple[int, ...]:
         """Return the goals that a member of the set serves, ascending.
@@ -136,4 +164,6 @@ class ViewedSet:
     @cached_property
     def assignment(self) -> tuple[int | None, ...]:
         """Number of the member that serves each goal, from 0; None where no member reaches it."""
+        if self.refined is not None:
+            return assign_goals(self.refined.scores, range(len(self.members)))
         return assign_goals(self.scores, self.members)

@@ -34,6 +34,10 @@ class Explanation:
     """Flat indices of the members of the best set."""
     best_reaching: tuple[int, ...]
     """Flat indices of those members that reach the goal."""
+    refined: tuple[InitialConfiguration, ...]
+    """Members of the best refined set, between the grid points; empty in a file without any."""
+    refined_reaching: tuple[int, ...]
+    """Numbers of those that reach the goal, from 0."""
     distribution: Distribution
     """Distribution of the reasons over the whole grid."""
     weights: TravelWeights
@@ -84,6 +88,12 @@ class Explanation:
                 "configurations": list(self.best_set),
                 "reaching": list(self.best_reaching),
             },
+            "refined_set": {
+                "members": [member.to_json() for member in self.refined],
+                "reaching": list(self.refined_reaching),
+            }
+            if self.refined
+            else None,
             "configurations": self.distribution.configurations,
             "reasons": {
                 reason.name.lower(): count for reason, count in self.distribution.reasons.items()
@@ -150,6 +160,7 @@ def explain(
     fix, unreachable = None, 0
     if explained is not None:
         fix, unreachable = nearest_fix(grid, scores, table.sets.lattice, goal, explained, weights)
+    refined, refined_reaching = _best_refined(file, match.index, goal)
     return Explanation(
         file=file,
         goal=goal,
@@ -157,11 +168,24 @@ def explain(
         explained=explained,
         best_set=table.sets.best,
         best_reaching=tuple(h for h in table.sets.best if scores.reached[h, goal]),
+        refined=refined,
+        refined_reaching=refined_reaching,
         distribution=Distribution.of(scores, goal),
         weights=weights,
         fix=fix,
         unreachable=unreachable,
     )
+
+
+def _best_refined(
+    file: ScoreFile, table: int, goal: int
+) -> tuple[tuple[InitialConfiguration, ...], tuple[int, ...]]:
+    """Return the best refined set of a table, and which of its members reach a goal."""
+    refined = file.tables[table].refined
+    if refined is None:
+        return (), ()
+    members = refined.members(file.configurations, 0)
+    return members, tuple(i for i in range(len(members)) if refined.reached[0, i, goal])
 
 
 def _best_member(sets: SetTable) -> int | None:

@@ -6,12 +6,17 @@ what any set could reach.
 
 from __future__ import annotations
 
+from tcs.placement.refinement.evaluation import evaluate_refined
+from tcs.placement.refinement.members import (
+    RefinedMembers,
+    refined_table,
+    score_members,
+)
 from tcs.placement.refinement.place import Placement, place
 from tcs.placement.refinement.points import Points, PointScorer, PointScores
 from tcs.placement.refinement.refined_file import (
     OBJECTIVES,
     refine,
-    refined_members,
     refinement_summary,
 )
 
@@ -21,8 +26,11 @@ __all__ = [
     "PointScorer",
     "PointScores",
     "Points",
+    "RefinedMembers",
+    "evaluate_refined",
     "place",
     "refine",
-    "refined_members",
+    "refined_table",
     "refinement_summary",
+    "score_members",
 ]

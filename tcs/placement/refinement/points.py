@@ -20,9 +20,9 @@ from tcs.model.scene import LoweredScene, Scene, environment_at, torso_at
 from tcs.placement.constraints import Footprint
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.rebuild import rebuild_scene
-from tcs.placement.scoring.sweep import warm_up
+from tcs.placement.scoring.sweep import name_contacts, warm_up
 from tcs.placement.store import ScoreFile, files_of_arms
-from tcs.placement.tables import Reason
+from tcs.placement.tables import Reason, ScoreTable
 
 BATCH = 32
 """Configurations that a thread scores at a time: some milliseconds of work."""
@@ -118,10 +118,41 @@ class PointScorer:
 
     def score(self, points: Points) -> PointScores:
         """Return the scores of configurations; one on a forbidden region reaches nothing."""
+        found = self._scores(points)
+        return PointScores(found.reason == Reason.REACHED, found.dexterity, found.joints)
+
+    def score_table(self, points: Points, weights: FloatArray) -> ScoreTable:
+        """Return the scores of configurations as a table, with reasons and bodies in contact.
+
+        Args:
+            points: The configurations.
+            weights: Weights of the goals, sum 1, shape (G,).
+        """
+        found = self._scores(points)
+        names: list[tuple[str, str]] = []
+        for number, arm in enumerate(self.arms):
+            rows = points.arm == number
+            pair = found.contact[rows]
+            problem = build_problem(arm.lowered.arrays, arm.lowered.grid, self.measure)
+            of_arm = name_contacts(pair, arm.lowered, problem)
+            found.contact[rows] = np.where(pair >= 0, pair + len(names), -1)
+            names.extend(of_arm)
+        reached = found.reason == Reason.REACHED
+        return ScoreTable(
+            dexterity=found.dexterity,
+            reason=found.reason,
+            pair=found.contact,
+            pair_names=tuple(names),
+            arm_joints=found.joints[reached],
+            weights=weights,
+        )
+
+    def _scores(self, points: Points) -> Scores:
+        """Return the scores of configurations as the kernel gives them, 0 where not reached."""
         count = len(points.values)
         found = Scores(
             reason=np.full((count, self.goals), Reason.EXCLUDED, np.uint8),
-            contact=np.empty((count, self.goals), np.int32),
+            contact=np.full((count, self.goals), -1, np.int32),
             dexterity=np.zeros((count, self.goals), np.float32),
             joints=np.zeros((count, self.goals, 7), np.float32),
         )
@@ -132,7 +163,7 @@ class PointScorer:
                 self._score_arm(arm, points.values, rows, found)
         reached = found.reason == Reason.REACHED
         found.dexterity[~reached], found.joints[~reached] = 0.0, 0.0
-        return PointScores(reached, found.dexterity, found.joints)
+        return found
 
     def never_reached(self) -> BoolArray:
         """Return the goals at which the gripper of every arm is in contact, shape (G,).

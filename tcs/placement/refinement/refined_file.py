@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from tcs.errors import SelectionError, TcsError, UnknownNameError
-from tcs.model.grid import InitialConfiguration
 from tcs.model.random_streams import check_draws, named_generator
 from tcs.placement.refinement.bound import upper_bound
 from tcs.placement.refinement.displaced import DisplacedBases
@@ -232,21 +231,11 @@ def refinement_summary(file: ScoreFile, table: int | None = None) -> dict[str, A
         "after": {
             "reachability": round(float(refined.reachability[0]), 12),
             "manipulability": round(float(refined.manipulability[0]), 12),
-            "members": [member.to_json() for member in refined_members(file, refined, 0)],
+            "members": [member.to_json() for member in refined.members(file.configurations, 0)],
         },
         "gap": settings["bound"] / total - 1.0,
         "sets": len(refined.origin),
     }
-
-
-def refined_members(
-    file: ScoreFile, refined: RefinedTable, row: int
-) -> tuple[InitialConfiguration, ...]:
-    """Return the members of a refined set."""
-    return tuple(
-        file.configurations.between(refined.values[row, i], int(refined.origin[row, i]))
-        for i in range(int(refined.sizes[row]))
-    )
 
 
 def _samples(

@@ -144,7 +144,7 @@ def sweep(
             problem, approaches, reason, contact, dexterity, winning, jobs=jobs
         )
     done_at = time.perf_counter()
-    names = _name_contacts(contact, lowered, problem)
+    names = name_contacts(contact, lowered, problem)
     states = [slice(i * size // tables, (i + 1) * size // tables) for i in range(tables)]
     winners = np.cumsum([0, *(_reached(reason[rows]) for rows in states)])
     divided = tuple(
@@ -298,7 +298,7 @@ def _code_type(problem: Problem) -> type[np.int16] | type[np.int32]:
     return np.int16 if _codes(problem) <= np.iinfo(np.int16).max else np.int32
 
 
-def _name_contacts(
+def name_contacts(
     contact: NDArray[Any], lowered: LoweredScene, problem: Problem
 ) -> tuple[tuple[str, str], ...]:
     """Replace contact codes, in place, by indices into the returned pairs of names."""

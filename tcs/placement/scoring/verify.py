@@ -252,6 +252,24 @@ def check_pairs(file: ScoreFile, table: int, pairs: Sequence[tuple[int, int]]) -
     return checker.stored([(table * checker.size + h, g) for h, g in pairs], lambda: None)
 
 
+def check_refined(
+    file: ScoreFile, table: int, row: int, pairs: Sequence[tuple[int, int]]
+) -> list[Finding]:
+    """Return Drake's findings on the stored solutions of a refined set.
+
+    Args:
+        file: A score file with refined sets.
+        table: Number of the observed state.
+        row: Number of the set.
+        pairs: Numbers of its members, each with a goal that it reaches.
+
+    Raises:
+        StoreMismatchError: If the models differ from those the file was made from.
+    """
+    checker = _FileChecker.of(file, jobs=1)
+    return checker.refined([RefinedPair(table, row, i, g) for i, g in pairs], lambda: None)
+
+
 class RefinedPair(NamedTuple):
     """A goal that a member of a refined set reaches, by their numbers."""
 

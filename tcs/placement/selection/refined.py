@@ -82,13 +82,6 @@ class RefinedQuery:
         """Return the values of the members of a set, shape (m, axes)."""
         return self.refined.values[row, : int(self.refined.sizes[row])]
 
-    def _members(self, row: int) -> tuple[InitialConfiguration, ...]:
-        grid = self.tables.grid
-        return tuple(
-            grid.between(values.tolist(), int(near))
-            for values, near in zip(self._values(row), self.refined.origin[row], strict=False)
-        )
-
     def _admits(self, constraints: Constraints, row: int) -> bool:
         """Return whether all members of a set satisfy the constraints."""
         grid, values = self.tables.grid, self._values(row)
@@ -115,7 +108,7 @@ class RefinedQuery:
     def _choice(self, row: int) -> Choice | None:
         """Return the choice of a set; None if no path leads to it."""
         refined, here = self.refined, self.here
-        members = self._members(row)
+        members = refined.members(self.tables.grid, row)
         count = len(members)
         cells = self._cells[row, :count]
         if not np.all(self.legs.reachable[cells]):

@@ -9,7 +9,7 @@ from __future__ import annotations
 from tcs.placement.tables.base_lattice import BaseLattice
 from tcs.placement.tables.equations import tc_manipulability, tc_reachability
 from tcs.placement.tables.motions import MotionOutcome, MotionTable
-from tcs.placement.tables.refined import RefinedTable
+from tcs.placement.tables.refined import RefinedSet, RefinedTable
 from tcs.placement.tables.scores import Reason, ScoreTable
 from tcs.placement.tables.sets import SetTable
 from tcs.placement.tables.success import SuccessTable
@@ -19,6 +19,7 @@ __all__ = [
     "MotionOutcome",
     "MotionTable",
     "Reason",
+    "RefinedSet",
     "RefinedTable",
     "ScoreTable",
     "SetTable",

@@ -3,15 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tcs.model.grid import Grid, InitialConfiguration
 from tcs.placement.tables.checks import ArrayTable, Shapes, length_of, require
 from tcs.placement.tables.equations import tc_manipulability, tc_reachability
 from tcs.placement.tables.scores import WEIGHT_SUM_TOLERANCE
 from tcs.placement.tables.sets import MOST_MEMBERS
 from tcs.placement.tables.success import NO_MEMBER
+
+
+class RefinedSet(NamedTuple):
+    """A refined set of a score file."""
+
+    table: int
+    """Number of the table."""
+    row: int
+    """Number of the set."""
+    order: tuple[int, ...]
+    """Numbers of the members, in the order of the visits."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,6 +87,18 @@ class RefinedTable(ArrayTable):
             bool(np.all(self.weights >= 0.0))
             and abs(float(self.weights.sum()) - 1.0) <= WEIGHT_SUM_TOLERANCE,
             "refined table: weights must be >= 0 and sum to 1.",
+        )
+
+    def members(self, grid: Grid, row: int) -> tuple[InitialConfiguration, ...]:
+        """Return the members of a set.
+
+        Args:
+            grid: The grid that the sets were refined from.
+            row: Number of the set.
+        """
+        return tuple(
+            grid.between(self.values[row, i].tolist(), int(self.origin[row, i]))
+            for i in range(int(self.sizes[row]))
         )
 
     @property
