@@ -291,6 +291,10 @@ class ShownOptions:
     torso: Torso = 0.0
     max_members: Members = None
     observed: Observed = None
+    refined: Annotated[
+        bool,
+        typer.Option(help="Whether a refined set is shown, in a file that `tcs refine` refined."),
+    ] = True
 
     def state(self) -> InitialConfiguration | None:
         """Return the current state, or None without `--here`.

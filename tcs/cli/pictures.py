@@ -113,7 +113,7 @@ def _draw(
     from tcs.output.report.shown_set import ShownSet
 
     observed = chosen.observation(loaded.observed_axes)
-    shown = ShownSet.of(loaded, here, chosen.max_members, observed)
+    shown = ShownSet.of(loaded, here, chosen.max_members, observed, refined=chosen.refined)
     save_figure(out, figure(loaded, shown))
     result = {"file": str(out), "members": [member.to_json() for member in shown.members]}
     terminal.print_result(result, lambda _: typer.echo(f"wrote {out}"), as_json=as_json)

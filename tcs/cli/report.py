@@ -56,6 +56,7 @@ def report(
             here=here,
             max_members=chosen.max_members,
             observed=found,
+            refined=chosen.refined,
             sizes=CheckSizes(pairs=sizes.pairs, dense=sizes.dense, seed=sizes.seed),
             tours=motions,
             on_progress=on_progress,

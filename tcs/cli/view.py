@@ -49,6 +49,7 @@ def view(
         here=here,
         max_members=chosen.max_members,
         observed=chosen.observation(loaded.observed_axes),
+        refined=chosen.refined,
         meshes=page.meshes or page.export is None,
     )
     if page.export is not None:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tcs.errors import SelectionError, TcsError, UnknownNameError
 from tcs.kernel.cache import is_compiled
@@ -213,11 +214,7 @@ def _refined_places(
         places.append((None, [float(known[axis.name]) for axis in job.scored_grid.axes]))
     rows = list(chosen.order)
     reached, dexterity = refined.reached[chosen.row, rows], refined.dexterity[chosen.row, rows]
-    serving = [
-        sorted(np.flatnonzero(reached[:, goal]).tolist(), key=lambda n, g=goal: -dexterity[n, g])
-        for goal in range(reached.shape[1])
-    ]
-    return places, serving
+    return places, _by_dexterity(reached, dexterity)
 
 
 def exact_state(
@@ -254,13 +251,18 @@ def value_of(at: InitialConfiguration, axis: str) -> float:
 
 def _serving(file: ScoreFile, job: Job, members: Sequence[int]) -> list[list[int]]:
     """Return the numbers of the members that reach each goal, the most dexterous first."""
-    rows = []
+    reached, dexterity = [], []
     for h in members:
         table, row = divmod(h, job.grid.size)
         scores = file.tables[table].scores
-        rows.append((scores.reached[row], scores.dexterity[row]))
-    serving = []
-    for goal in range(len(job.task.goals)):
-        able = [n for n, (reached, _) in enumerate(rows) if reached[goal]]
-        serving.append(sorted(able, key=lambda n: -float(rows[n][1][goal])))
-    return serving
+        reached.append(scores.reached[row])
+        dexterity.append(scores.dexterity[row])
+    return _by_dexterity(np.array(reached), np.array(dexterity))
+
+
+def _by_dexterity(reached: NDArray[np.bool_], dexterity: NDArray[np.float32]) -> list[list[int]]:
+    """Return the members that reach each goal, the most dexterous first, given shapes (m, G)."""
+    order = np.argsort(-dexterity, axis=0, kind="stable")
+    return [
+        [int(n) for n in order[:, goal] if reached[n, goal]] for goal in range(reached.shape[1])
+    ]

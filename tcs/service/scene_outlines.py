@@ -46,7 +46,7 @@ def scene_outlines(file: ScoreFile, progress: Progress, only: int | None = None)
         StoreMismatchError: If the models are not those the file was made from.
     """
     grid = file.configurations
-    shown = ShownSet(None, (), (), file.nominal_index, "")
+    shown = ShownSet(None, (), (), file.nominal_index, "", file)
     scored = scored_scene(file, shown, arm=next(iter(file.arms), None))
     job, scene = scored
     base = base_outline(scene)

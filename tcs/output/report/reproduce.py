@@ -23,8 +23,33 @@ def commands(report: ScoreReport, command: str) -> str:
         command: The command that made the report.
     """
     return "\n".join(
-        part for part in (score_command(report), robustify_command(report), command) if part
+        part
+        for part in (
+            score_command(report),
+            robustify_command(report),
+            refine_command(report),
+            command,
+        )
+        if part
     )
+
+
+def refine_command(report: ScoreReport) -> str:
+    """Return the command that refined the table of the report; "" if none did."""
+    settings = report.file.metadata.get("refinement", [None] * len(report.file.tables))
+    found = settings[report.shown.table]
+    if found is None:
+        return ""
+    words = ["tcs", "refine", str(report.path), "--objective", found["objective"]]
+    words += ["--starts", str(found["starts"]), "--rounds", str(found["rounds"])]
+    if found["samples"] is not None:
+        words += ["--samples", str(found["samples"])]
+    if found["objective"] == "score" and not found["keep_success"]:
+        words.append("--no-keep-success")
+    words += ["--seed", str(found["seed"])]
+    if report.shown.table != report.file.nominal_index:
+        words += _observed(report)
+    return shlex.join(words)
 
 
 def score_command(report: ScoreReport) -> str:

@@ -190,6 +190,7 @@ def make_score_report(
     here: InitialConfiguration | None = None,
     max_members: int | None = None,
     observed: Mapping[str, float] | None = None,
+    refined: bool = True,
     sizes: CheckSizes | None = None,
     tours: bool = False,
     on_progress: Callable[[int, int], None] | None = None,
@@ -201,6 +202,7 @@ def make_score_report(
         here: The current state; if None, the set with the best scores is reported.
         max_members: Most members of the set; by default as many as the file holds.
         observed: Observed values of the observed axes [m or rad].
+        refined: Whether a refined set may be reported.
         sizes: How many pairs to verify.
         tours: Whether to plan the motions of the set, and re-check them.
         on_progress: Called with the numbers of pairs done and in total.
@@ -212,7 +214,7 @@ def make_score_report(
     """
     begun, sizes = time.perf_counter(), sizes or CheckSizes()
     file = load_scores(path)
-    shown = ShownSet.of(file, here, max_members, observed)
+    shown = ShownSet.of(file, here, max_members, observed, refined=refined)
     scored = scored_scene(file, shown)
     served = {
         goal: shown.rows[number]

@@ -41,6 +41,7 @@ def make_score_view(
     here: InitialConfiguration | None = None,
     max_members: int | None = None,
     observed: Mapping[str, float] | None = None,
+    refined: bool = True,
     meshes: bool = False,
 ) -> ScoreView:
     """Return the view of a score file.
@@ -50,15 +51,16 @@ def make_score_view(
         here: The current state; if None, the set with the best scores is shown.
         max_members: Most members of the set; by default as many as the file holds.
         observed: Observed values of the observed axes [m or rad].
+        refined: Whether a refined set may be shown.
         meshes: Whether to show the robot with its meshes.
 
     Raises:
         StoreError: If the file was made from other models.
         SelectionError: If there is no such set.
     """
-    shown = ShownSet.of(file, here, max_members, observed)
+    shown = ShownSet.of(file, here, max_members, observed, refined=refined)
     job, scene = scored_scene(file, shown, meshes=meshes)
-    viewed = ViewedSet.of(file, shown)
+    viewed = ViewedSet.of_shown(shown)
     return ScoreView(
         viewed=viewed,
         objects=SceneObjects(scene, job.task, viewed, meshes=meshes),

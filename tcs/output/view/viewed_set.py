@@ -94,11 +94,17 @@ class ViewedSet:
     """Flat indices of the configurations of the grid that they were refined from."""
 
     @classmethod
-    def of(cls, file: ScoreFile, shown: ShownSet) -> ViewedSet:
-        """Return the set of a score file that is shown."""
-        found, grid = file.tables[shown.table], Grid.from_dict(file.grid)
+    def of(cls, file: ScoreFile, table: int, members: tuple[int, ...]) -> ViewedSet:
+        """Return a set of a state table of a file."""
+        found = file.tables[table]
+        return cls(Grid.from_dict(file.grid), found.scores, members, found.success)
+
+    @classmethod
+    def of_shown(cls, shown: ShownSet) -> ViewedSet:
+        """Return the set of a score file that is shown, which may be refined."""
         if shown.refined is None:
-            return cls(grid, found.scores, shown.indices, found.success)
+            return cls.of(shown.file, shown.table, shown.indices)
+        found, grid = shown.file.tables[shown.table], Grid.from_dict(shown.file.grid)
         members = tuple(grid.size + i for i in range(len(shown.members)))
         refined = RefinedMembers(shown.members, shown.scores)
         return cls(grid, found.scores, members, found.success, refined, shown.indices)

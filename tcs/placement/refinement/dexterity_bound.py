@@ -87,7 +87,7 @@ def _isotropy_bound(R: bytes, p: bytes, lower: bytes, upper: bytes) -> float:
         np.frombuffer(upper),
     )
     bound = _from_reach(chain)
-    if _is_relaxable(chain):
+    if is_relaxable(chain):
         bound = min(bound, _branch_and_bound(chain))
     return min(1.0, bound + ROUNDING)
 
@@ -105,7 +105,7 @@ def _from_reach(chain: Chain) -> float:
     return 2.0 * float(np.sqrt(7.0 * linear)) / (7.0 + linear)
 
 
-def _is_relaxable(chain: Chain) -> bool:
+def is_relaxable(chain: Chain) -> bool:
     """Return whether the last three axes meet at right angles, and the tool is on the last."""
     offsets = np.append(np.linalg.norm(chain.p[5:7], axis=1), np.abs(chain.p[7, :2]))
     return bool(np.all(offsets <= MEETS) and np.all(np.abs(chain.R[5:7, 2, 2]) <= MEETS))
@@ -132,9 +132,7 @@ class _Upper(NamedTuple):
     def of(cls, chain: Chain, q2: Interval, q3: Interval, q4: Interval) -> Self:
         """Return the joints at these angles."""
         zero, up = np.zeros(3), np.array([0.0, 0.0, 1.0])
-        # Axis 1 and its origin in link 2.
-        z1 = turned(fixed(chain.R[1].T @ up), q2, -1.0)
-        o1 = turned(fixed(-chain.R[1].T @ chain.p[1]), q2, -1.0)
+        z1, o1 = _first_axis(chain, q2)
         # Axes 3 and 4 and the wrist centre.
         z3, o3 = fixed(chain.R[2] @ up), fixed(chain.p[2])
         z4 = moved(chain.R[2], zero, turned(fixed(chain.R[3] @ up), q3, 1.0))
@@ -207,15 +205,45 @@ class _Relaxed(NamedTuple):
         return np.asarray(7.0 + tool**2 * (2.0 - c**2) + first)
 
 
-def _relaxed(chain: Chain, box: Interval) -> FloatArray:
-    """Return an upper bound of the relaxed isotropy in boxes of joints 2, 3, 4, shape (n,)."""
+def relaxed_by_angle(chain: Chain, box: Interval) -> FloatArray:
+    """Return an upper bound of the relaxed isotropy in boxes of joints 2, 3, 4.
+
+    Returns:
+        One for each interval of `ANGLES`, shape (n, intervals).
+    """
     parts, tool = _parts(chain, box), float(np.linalg.norm(chain.p[7]))
-    best = np.zeros_like(parts.m)
+    found = []
     for low, high in itertools.pairwise(ANGLES):
         c, s = float(np.cos(low)), float(np.sin(high))
         determinant, trace = parts.determinant(c, s), parts.trace(c, s, tool)
-        best = np.maximum(best, determinant ** (1 / 6) * 6.0 / trace)
-    return best
+        found.append(determinant ** (1 / 6) * 6.0 / trace)
+    return np.stack(found, axis=1)
+
+
+def _relaxed(chain: Chain, box: Interval) -> FloatArray:
+    """Return an upper bound of the relaxed isotropy in boxes of joints 2, 3, 4, shape (n,)."""
+    return np.asarray(relaxed_by_angle(chain, box).max(axis=1))
+
+
+def wrist_height(chain: Chain, box: Interval) -> Interval:
+    """Return how far the wrist centre is from joint 1, along its axis, in boxes [m]."""
+    z1, o1 = _first_axis(chain, box.column(0))
+    wrist = _from_link_4(chain, fixed(chain.p[4]), box.column(1), box.column(2))
+    return dot(z1, less(wrist, o1))
+
+
+def forearm(chain: Chain, box: Interval) -> Interval:
+    """Return the cosine of the angle between axes 1 and 5, in boxes of joints 2, 3, 4."""
+    z1, _ = _first_axis(chain, box.column(0))
+    z5 = fixed(chain.R[4][:, 2])
+    return dot(z1, _from_link_4(chain, z5, box.column(1), box.column(2), is_point=False))
+
+
+def _first_axis(chain: Chain, q2: Interval) -> tuple[Vector, Vector]:
+    """Return axis 1 and its origin in the frame of link 2."""
+    up = np.array([0.0, 0.0, 1.0])
+    z1 = turned(fixed(chain.R[1].T @ up), q2, -1.0)
+    return z1, turned(fixed(-chain.R[1].T @ chain.p[1]), q2, -1.0)
 
 
 def _parts(chain: Chain, box: Interval) -> _Relaxed:
@@ -265,14 +293,7 @@ def descent(chain: Chain, resolution: float = RESOLUTION) -> list[float]:
         chain: An arm with a spherical wrist.
         resolution: Difference from the greatest relaxed isotropy at which branching ends.
     """
-    low, high = chain.lower[1:4], chain.upper[1:4]
-    low, high = np.where(np.isfinite(low), low, -np.pi), np.where(np.isfinite(high), high, np.pi)
-    counts = np.maximum(1, np.ceil((high - low) / FIRST_CELLS)).astype(int)
-    corners = [np.linspace(a, b, n + 1) for a, b, n in zip(low, high, counts, strict=True)]
-    boxes = Interval(
-        np.stack(np.meshgrid(*(c[:-1] for c in corners), indexing="ij"), axis=-1).reshape(-1, 3),
-        np.stack(np.meshgrid(*(c[1:] for c in corners), indexing="ij"), axis=-1).reshape(-1, 3),
-    )
+    boxes = first_boxes(chain)
     # What a box cannot be shown to stay below: a value that the relaxed isotropy takes.
     taken, course = 0.0, []
     while True:
@@ -283,10 +304,22 @@ def descent(chain: Chain, resolution: float = RESOLUTION) -> list[float]:
         is_open = bounds > taken + resolution
         if not np.any(is_open) or 2 * np.count_nonzero(is_open) > MOST_BOXES:
             return course
-        boxes = _halved(boxes.rows(is_open))
+        boxes = halved(boxes.rows(is_open))
 
 
-def _halved(boxes: Interval) -> Interval:
+def first_boxes(chain: Chain) -> Interval:
+    """Return boxes that cover the angles of joints 2, 3 and 4."""
+    low, high = chain.lower[1:4], chain.upper[1:4]
+    low, high = np.where(np.isfinite(low), low, -np.pi), np.where(np.isfinite(high), high, np.pi)
+    counts = np.maximum(1, np.ceil((high - low) / FIRST_CELLS)).astype(int)
+    corners = [np.linspace(a, b, n + 1) for a, b, n in zip(low, high, counts, strict=True)]
+    return Interval(
+        np.stack(np.meshgrid(*(c[:-1] for c in corners), indexing="ij"), axis=-1).reshape(-1, 3),
+        np.stack(np.meshgrid(*(c[1:] for c in corners), indexing="ij"), axis=-1).reshape(-1, 3),
+    )
+
+
+def halved(boxes: Interval) -> Interval:
     """Return both halves of boxes, cut across their longest edges."""
     rows = np.arange(len(boxes.low))
     edge = np.argmax(boxes.high - boxes.low, axis=1)

@@ -49,7 +49,7 @@ class PointScores(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class _Arm:
+class ScoredArm:
     """The robot with one of its arms."""
 
     job: Job
@@ -65,7 +65,7 @@ class PointScorer:
     Construction builds Drake's plant, which takes half a second.
     """
 
-    arms: tuple[_Arm, ...]
+    arms: tuple[ScoredArm, ...]
     """The robot with each arm, in the order of the grid."""
     grid: Grid
     """The grid of the file."""
@@ -91,7 +91,7 @@ class PointScorer:
                 "Configurations off the grid are scored without approach only. Score the task "
                 "again with --no-approach."
             )
-        arms = tuple(_Arm(*rebuild_scene(of_arm)) for of_arm in files_of_arms(file))
+        arms = tuple(ScoredArm(*rebuild_scene(of_arm)) for of_arm in files_of_arms(file))
         return cls(
             arms,
             file.configurations,
@@ -179,6 +179,15 @@ class PointScorer:
             blocked &= blocked_grippers(problem)[0]
         return blocked
 
+    def goal_poses(self, arm: ScoredArm) -> tuple[FloatArray, FloatArray]:
+        """Return rotations and origins of the goals in W, without axes of the environment.
+
+        Returns:
+            Shapes (G, 3, 3) and (G, 3).
+        """
+        problem = self._problem(arm, np.empty((1, 0)), np.zeros(1))
+        return problem.goal_R[0], problem.goal_p[0]
+
     def _forbidden(self, points: Points) -> BoolArray:
         """Return which configurations stand on a forbidden region, shape (n,)."""
         base = self._columns(points.values, "base_x", "base_y", "base_yaw")
@@ -192,7 +201,7 @@ class PointScorer:
         order = list(ROBOT_AXES)
         return values[:, [order.index(name) - len(order) for name in names]]
 
-    def _score_arm(self, arm: _Arm, values: FloatArray, rows: IntArray, found: Scores) -> None:
+    def _score_arm(self, arm: ScoredArm, values: FloatArray, rows: IntArray, found: Scores) -> None:
         """Fill the scores of some configurations, all with one arm."""
         chosen = values[rows]
         states, state = np.unique(chosen[:, : -len(ROBOT_AXES)], axis=0, return_inverse=True)
@@ -219,7 +228,7 @@ class PointScorer:
             delayed(score_batch)(start) for start in range(0, rows.size, BATCH)
         )
 
-    def _problem(self, arm: _Arm, states: FloatArray, levels: FloatArray) -> Problem:
+    def _problem(self, arm: ScoredArm, states: FloatArray, levels: FloatArray) -> Problem:
         """Return the kernel's problem of environment states and torso heights."""
         names = [axis.name for axis in self.grid.environment_axes]
         positions = (

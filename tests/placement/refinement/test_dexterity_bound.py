@@ -8,11 +8,13 @@ import pytest
 from tcs.model.robots import load_robot
 from tcs.model.scene import EMPTY_ENVIRONMENT, Scene, SceneSpec, arm_chain
 from tcs.placement.refinement.dexterity_bound import (
+    ANGLES,
     _parts,
     _relaxed,
     descent,
     dexterity_bound,
 )
+from tcs.placement.refinement.goal_bound import GoalLimits, goal_bounds
 from tcs.placement.refinement.intervals import Interval, cosine
 
 
@@ -126,3 +128,62 @@ def test_cosine_of_an_interval_holds_all_cosines(rng):
 
 def test_other_measures_have_the_trivial_bound(lowered):
     assert dexterity_bound(lowered.arrays.chain, "inverse-condition") == 1.0
+
+
+def heights_and_tilts(chain, q):
+    """Return the wrist centre's distance from joint 1 along its axis, and the angle of axis 7."""
+    R, p = np.tile(np.eye(3), (len(q), 1, 1)), np.zeros((len(q), 3))
+    frames = []
+    for i in range(7):
+        p = p + R @ chain.p[i]
+        turn = np.tile(np.eye(3), (len(q), 1, 1))
+        turn[:, 0, 0] = turn[:, 1, 1] = np.cos(q[:, i])
+        turn[:, 1, 0] = np.sin(q[:, i])
+        turn[:, 0, 1] = -turn[:, 1, 0]
+        R = R @ chain.R[i] @ turn
+        frames.append((R[:, :, 2], p))
+    (z1, o1), (z7, wrist) = frames[0], frames[6]
+    return np.sum(z1 * (wrist - o1), axis=1), np.arccos(np.sum(z1 * z7, axis=1).clip(-1.0, 1.0))
+
+
+def test_no_posture_that_a_goal_allows_exceeds_its_bound(lowered, rng):
+    chain = lowered.arrays.chain
+    q, _, _ = random_angles(chain, rng, 12)
+    height, tilt = heights_and_tilts(chain, q)
+    limits = GoalLimits(height - 0.02, height + 0.02, tilt)
+    bounds = goal_bounds(chain, limits, 0.05)
+    assert np.all(isotropies(chain, q) <= bounds)
+    assert bounds.min() < 0.8 * bounds.max()
+    # Each box that holds the posture is allowed, with the angle of its wrist.
+    box = Interval(q[:, 1:4] - 0.02, q[:, 1:4] + 0.02)
+    _, cosine_57 = grams(chain, q)
+    at = np.searchsorted(ANGLES, np.arccos(np.abs(cosine_57)), side="right") - 1
+    for goal in range(len(q)):
+        fits, angles = limits.allowed(goal, chain, box)
+        assert fits[goal]
+        assert angles[goal, at[goal]]
+
+
+def test_limits_of_goals_follow_from_their_poses(lowered, rng):
+    chain, arrays = lowered.arrays.chain, lowered.arrays
+    q, _, _ = random_angles(chain, rng, 5)
+    height, tilt = heights_and_tilts(chain, q)
+    R, p = np.tile(np.eye(3), (len(q), 1, 1)), np.zeros((len(q), 3))
+    for i in range(8):
+        p = p + R @ chain.p[i]
+        R = R @ chain.R[i]
+        if i < 7:
+            c, s, turn = np.cos(q[:, i]), np.sin(q[:, i]), np.tile(np.eye(3), (len(q), 1, 1))
+            turn[:, 0, 0] = turn[:, 1, 1] = c
+            turn[:, 1, 0], turn[:, 0, 1] = s, -s
+            R = R @ turn
+    ends = [0, -1]
+    R_BA, p_BA = arrays.arm_base_R[ends], arrays.arm_base_p[ends]
+    found = GoalLimits.of(chain, R_BA, p_BA, R_BA[0] @ R, p_BA[0] + p @ R_BA[0].T)
+    travel = p_BA[1, 2] - p_BA[0, 2]
+    assert travel > 0.2
+    np.testing.assert_allclose(found.high, height, atol=2e-6)
+    np.testing.assert_allclose(found.low, height - travel, atol=2e-6)
+    np.testing.assert_allclose(found.tilt, tilt, atol=1e-6)
+    leaning = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    assert GoalLimits.of(chain, leaning @ R_BA, p_BA, R, p) is None

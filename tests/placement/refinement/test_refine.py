@@ -11,7 +11,15 @@ import pytest
 import tcs
 from tcs.errors import SelectionError, StoreError, TcsError, UnknownNameError
 from tcs.model.grid import Grid
-from tcs.placement.refinement import Points, PointScorer, refinement_summary
+from tcs.output.report.shown_set import ShownSet
+from tcs.output.view import Controls, ViewedSet
+from tcs.placement.refinement import (
+    Points,
+    PointScorer,
+    evaluate_refined,
+    refinement_summary,
+    score_members,
+)
 from tcs.placement.refinement.displaced import ANGLE, RADIUS, DisplacedBases
 from tcs.placement.refinement.floor import SLACK, settled
 from tcs.placement.refinement.objectives import ScoreObjective
@@ -20,6 +28,7 @@ from tcs.placement.refinement.search import Evaluated, LocalSearch, Walk
 from tcs.placement.refinement.space import Space
 from tcs.placement.robustness import Trials
 from tcs.placement.store.encoding import decode, encode
+from tcs.placement.tables import Reason, RefinedSet
 
 BESIDE = """
 based_on: wheelchair
@@ -281,3 +290,87 @@ def test_headings_are_periodic_where_the_grid_covers_them(wheelchair, scored):
     space = Space.of(grid, scored.nominal.sets)
     moved = space.inside(np.array([[9.0, -9.0, -0.1, 0.2]]))
     np.testing.assert_allclose(moved, [[1.5, -1.5, 2.0 * np.pi - 0.1, 0.2]])
+
+
+def test_members_have_the_reasons_where_they_reach_nothing(refined):
+    table = refined.nominal.refined
+    row = int(np.argmax(table.sizes))
+    order = tuple(reversed(range(int(table.sizes[row]))))
+    found = score_members(refined, RefinedSet(0, row, order))
+    np.testing.assert_array_equal(found.scores.reached, table.reached[row, list(order)])
+    np.testing.assert_array_equal(found.scores.dexterity, table.dexterity[row, list(order)])
+    blocked = found.scores.reason == Reason.ARM_BLOCKED
+    assert np.any(found.scores.reason != Reason.REACHED)
+    assert np.all(found.scores.pair[blocked] >= 0)
+    assert found.members == tuple(table.members(refined.configurations, row)[i] for i in order)
+
+
+def test_a_refined_set_is_evaluated_like_one_of_the_grid(scored, refined):
+    table, best = refined.nominal.refined, scored.nominal.sets.best
+    row = next(k for k, size in enumerate(table.sizes) if size == len(best))
+    values = table.values.copy()
+    grid = scored.configurations.values(np.array(best))
+    values[row, : len(best)] = np.stack([*grid.values()], axis=1)
+    on_grid = dataclasses.replace(table, values=values)
+    file = dataclasses.replace(
+        refined, tables=(dataclasses.replace(refined.nominal, refined=on_grid),)
+    )
+    found = evaluate_refined(file, row=row, samples=20)
+    np.testing.assert_array_equal(found.reached, tcs.evaluate(scored, samples=20).reached)
+    moved = evaluate_refined(refined, row=row, samples=20)
+    assert moved.members != found.members
+    with pytest.raises(SelectionError, match="no refined set 99"):
+        evaluate_refined(refined, row=99)
+    with pytest.raises(SelectionError, match="No sets of this table were refined"):
+        evaluate_refined(scored)
+
+
+def test_plans_stop_where_the_refined_set_is(refined):
+    free = tcs.UtilityWeights(travel=0.0)
+    choice = tcs.select(refined, HERE, weights=free)
+    table = refined.nominal.refined
+    for members in (choice, RefinedSet(0, choice.refined, choice.order)):
+        found = tcs.plan(refined, members)
+        for stop, i in zip(found.stops, choice.order, strict=True):
+            at, expected = stop.at, choice.members[i]
+            assert stop.index is None
+            assert [at.base_x, at.base_y, at.base_yaw, at.torso] == pytest.approx(
+                [expected.base_x, expected.base_y, expected.base_yaw, expected.torso]
+            )
+        assert found.false == 0
+        reached = table.reached[choice.refined].any(axis=0)
+        assert [result.reason == "unreached" for result in found.results] == list(~reached)
+
+
+def test_a_refined_set_is_shown(scored, refined):
+    table = refined.nominal.refined
+    shown = ShownSet.of(refined, None)
+    assert shown.members == table.members(refined.configurations, 0)
+    assert (shown.reachability, shown.manipulability) == (
+        table.reachability[0],
+        table.manipulability[0],
+    )
+    assert shown.stored == ()
+    assert ShownSet.of(refined, None, refined=False).members == ShownSet.of(scored, None).members
+    assert len(ShownSet.of(refined, None, 1).members) == 1
+    viewed = ViewedSet.of_shown(shown)
+    assert [viewed.configuration(h) for h in viewed.members] == list(shown.members)
+    controls = Controls(viewed)
+    state = controls.first()
+    result = viewed.result(controls.index(state))
+    assert result.configuration == shown.members[0]
+    assert result.reached == tuple(np.flatnonzero(table.reached[0, 0]))
+    joints = viewed.joints(viewed.members[0], result.reached[0])
+    np.testing.assert_array_equal(joints, table.arm_joints[0, 0, result.reached[0]])
+    # A slider leads to the grid.
+    slider = controls.sliders[-1]
+    moved = controls.moved(state, slider.name, slider.low)
+    assert controls.index(moved) < viewed.grid.size
+
+
+def test_an_explanation_says_which_refined_members_reach_a_goal(scored, refined):
+    table = refined.nominal.refined
+    found = tcs.explain(refined, 0)
+    assert found.refined == table.members(refined.configurations, 0)
+    assert list(found.refined_reaching) == list(np.flatnonzero(table.reached[0, :, 0]))
+    assert tcs.explain(scored, 0).to_json()["refined_set"] is None
