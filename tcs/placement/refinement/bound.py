@@ -48,4 +48,4 @@ def _of_arm(scorer: PointScorer, arm: ScoredArm) -> FloatArray:
     limits = GoalLimits.of(chain, base.arm_base_R, base.arm_base_p, goal_R, goal_p)
     if limits is None:
         return anywhere
-    return np.minimum(anywhere, goal_bounds(chain, limits))
+    return np.asarray(np.minimum(anywhere, goal_bounds(chain, limits)))

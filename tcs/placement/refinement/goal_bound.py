@@ -119,7 +119,7 @@ def goal_bounds(chain: Chain, limits: GoalLimits, resolution: float = RESOLUTION
         for goal in goals:
             is_open |= bounds[:, goal] > taken[goal] + resolution
         if not np.any(is_open) or 2 * np.count_nonzero(is_open) > MOST_BOXES:
-            return found
+            return np.asarray(found)
         boxes = halved(boxes.rows(is_open))
 
 
