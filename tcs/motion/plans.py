@@ -67,13 +67,22 @@ def plan(
     if order not in ORDERS:
         raise UnknownNameError("order", order, ORDERS)
     numbers: Sequence[int] | None = None
-    if file.arms:
+    if isinstance(members, Choice) and members.refined is not None:
+        table = 0 if members.match is None else members.match.index
+        members = RefinedSet(table, members.refined, members.order)
+    whole = file
+    if isinstance(members, RefinedSet):
+        file = _file_of_refined(file, members)
+    elif file.arms:
         numbers = _numbers(file, members)
         file, members = _of_one_arm(file, numbers)
     job, scene, _ = rebuild_scene(file)
     if on_compile is not None and not is_compiled(ENTRY):
         on_compile()
-    places, serving = _places(file, job, members)
+    if isinstance(members, RefinedSet):
+        places, serving = _refined_places(whole, job, members)
+    else:
+        places, serving = _places(file, job, members)
     results: dict[int, GoalResult] = {
         goal: GoalResult(goal, None, False, "unreached")
         for goal in range(len(job.task.goals))
@@ -166,7 +175,7 @@ Place = tuple[int | None, list[float]]
 
 
 def _places(
-    file: ScoreFile, job: Job, members: Choice | RefinedSet | Sequence[int] | InitialConfiguration
+    file: ScoreFile, job: Job, members: Choice | Sequence[int] | InitialConfiguration
 ) -> tuple[list[Place], list[list[int]]]:
     """Return the stops, and for each goal the numbers of those to try it from, the best first."""
     axes = job.scored_grid.axes
@@ -175,11 +184,7 @@ def _places(
         return [(None, values)], [[0]] * len(job.task.goals)
     if isinstance(members, Choice):
         table = 0 if members.match is None else members.match.index
-        if members.refined is not None:
-            return _refined_places(file, job, RefinedSet(table, members.refined, members.order))
         members = [table * job.grid.size + members.indices[i] for i in members.order]
-    if isinstance(members, RefinedSet):
-        return _refined_places(file, job, members)
     for h in members:
         if not 0 <= h < job.scored_grid.size:
             raise TcsError(
@@ -192,17 +197,34 @@ def _places(
     return places, _serving(file, job, members)
 
 
-def _refined_places(
-    file: ScoreFile, job: Job, chosen: RefinedSet
-) -> tuple[list[Place], list[list[int]]]:
-    """Return the stops of a refined set, as `_places` does.
+def _file_of_refined(file: ScoreFile, chosen: RefinedSet) -> ScoreFile:
+    """Return the file of the arm that a refined set uses: the file itself if it is of one arm.
 
     Raises:
         TcsError: If the file has no such set.
+        SelectionError: If its members use more than one arm.
     """
     refined = file.tables[chosen.table].refined
     if refined is None or not 0 <= chosen.row < len(refined.origin):
         raise TcsError(f"plan: no refined set {chosen.row}. Refine the file: tcs refine FILE.")
+    if not file.arms:
+        return file
+    grid = file.configurations
+    used = {int(refined.origin[chosen.row, i]) // grid.arm_size for i in chosen.order}
+    if len(used) > 1:
+        raise SelectionError(
+            "plan: the refined set uses more than one arm, and a plan is of one. Plan "
+            "configurations of each arm: --configuration N."
+        )
+    return file_of_arm(file, grid.arms[used.pop()])
+
+
+def _refined_places(
+    file: ScoreFile, job: Job, chosen: RefinedSet
+) -> tuple[list[Place], list[list[int]]]:
+    """Return the stops of a refined set of a file, as `_places` does."""
+    refined = file.tables[chosen.table].refined
+    assert refined is not None
     observed = file.observed_states[chosen.table]
     names = [axis.name for axis in file.configurations.axes]
     places: list[Place] = []

@@ -123,7 +123,7 @@ class Postures:
         from tcs.output.report.shown_set import ShownSet
 
         if digest not in self._scenes:
-            shown = ShownSet(None, (), (), file.nominal_index, "")
+            shown = ShownSet(None, (), (), file.nominal_index, "", file)
             self._scenes[digest] = scored_scene(file, shown)
         self._scenes.move_to_end(digest)
         while len(self._scenes) > _KEPT:
