@@ -60,8 +60,8 @@ def header(*packages: str) -> None:
 
 
 def row(name: str, text: str) -> None:
-    """Print one line of the table."""
-    print(f"{name:<34} {text}", flush=True)
+    """Print one line of the table, its columns two spaces or more apart."""
+    print(f"{name:<33}  {text}", flush=True)
 
 
 def cell(table: str, line: str, column: str, text: str) -> None:

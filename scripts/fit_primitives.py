@@ -10,6 +10,10 @@
                                                     leave the surface bare
     python scripts/fit_primitives.py tiago --parts  fits the parts of bodies that scripts/fits.yaml
                                                     names again, and keeps all other shapes
+    python scripts/fit_primitives.py ur5 --tighten wrist_1_link=20 ...     reduces each shape of
+                                                    these bodies to what it alone contains, and
+                                                    splits up to so many that protrude most; without
+                                                    bodies, those that scripts/fits.yaml names
 
 The results are deterministic. Each command takes a few minutes; pairs depend on the primitives.
 The last lines say how many postures the shapes block although the surfaces are free of
@@ -20,6 +24,7 @@ from __future__ import annotations
 
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -28,20 +33,32 @@ import yaml
 from tcs.errors import TcsError
 from tcs.files.paths import data_folder
 from tcs.model.robots import RobotFile, load_robot, read_primitives, write_primitives
-from tcs.model.robots.fitting import Part, Target, fit_robot, refit, refit_parts, target_of
+from tcs.model.robots.fitting import (
+    Part,
+    Target,
+    fit_robot,
+    refit,
+    refit_parts,
+    target_of,
+    tightened,
+)
 from tcs.model.robots.self_collision import blocked_at_boxes, blocked_by_shapes, renewed_groups
 
 FITS = Path(__file__).parent / "fits.yaml"
 """Bodies of the shipped robots that are not fitted as usual."""
+OPTIONS = ("--pairs", "--parts", "--tighten")
 _NUMBERS = re.compile(r"([1-9]\d*)(?:\+([1-9]\d*))?")
 """Number of shapes of a body, and of patches."""
 
 
 def main() -> int:
     """Rewrite primitives or pairs of the robot given on the command line."""
-    names = [a for a in sys.argv[1:] if a not in ("--pairs", "--parts") and "=" not in a]
+    names = [a for a in sys.argv[1:] if a not in OPTIONS and "=" not in a]
     more = [a.split("=") for a in sys.argv[1:] if "=" in a]
-    if len(names) != 1 or not all(len(m) == 2 and _NUMBERS.fullmatch(m[1]) for m in more):
+    are_numbers = all(len(m) == 2 and _NUMBERS.fullmatch(m[1]) for m in more)
+    if "--tighten" in sys.argv:
+        are_numbers = all(len(m) == 2 and m[1].isdecimal() for m in more)
+    if len(names) != 1 or not are_numbers:
         print(__doc__, file=sys.stderr)
         return 2
     try:
@@ -53,6 +70,11 @@ def main() -> int:
             rewrite_pairs(robot, path)
         elif "--parts" in sys.argv:
             shapes = refit_parts(robot, read_primitives(Path(robot.primitives)), parts_of(robot))
+            write_primitives(Path(robot.primitives), shapes)
+            print_blocked(robot)
+        elif "--tighten" in sys.argv:
+            splits = {body: int(text) for body, text in more} or splits_of(robot)
+            shapes = tightened(robot, read_primitives(Path(robot.primitives)), splits)
             write_primitives(Path(robot.primitives), shapes)
             print_blocked(robot)
         elif more:
@@ -74,7 +96,8 @@ def rewrite_primitives(robot: RobotFile) -> None:
         robot, lambda done, total: print(f"{done}/{total}", file=sys.stderr), chosen_fits(robot)
     )
     shapes = [p for f in fits for p in f.fit.primitives]
-    write_primitives(Path(robot.primitives), refit_parts(robot, shapes, parts_of(robot)))
+    shapes = refit_parts(robot, shapes, parts_of(robot))
+    write_primitives(Path(robot.primitives), tightened(robot, shapes, splits_of(robot)))
     print("| body | shapes | hull [l] | union [l] | excess |")
     print("|---|---|---|---|---|")
     for found in fits:
@@ -94,7 +117,8 @@ def chosen_fits(robot: RobotFile) -> dict[str, Target | None]:
         elif isinstance(fit, int | str):
             chosen[body] = numbers(robot, body, str(fit))
         elif "shapes" in fit:
-            chosen[body] = Target(protrusion=fit["protrusion"], max_shapes=fit["shapes"])
+            usual = numbers(robot, body, str(fit["shapes"]))
+            chosen[body] = replace(usual, protrusion=fit.get("protrusion", usual.protrusion))
     return chosen
 
 
@@ -104,6 +128,15 @@ def parts_of(robot: RobotFile) -> dict[str, list[Part]]:
         body: [Part(**part) for part in fit["parts"]]
         for body, fit in _fits(robot).items()
         if isinstance(fit, dict) and "parts" in fit
+    }
+
+
+def splits_of(robot: RobotFile) -> dict[str, int]:
+    """Return how many shapes of bodies of a robot FITS says to split."""
+    return {
+        body: fit["splits"]
+        for body, fit in _fits(robot).items()
+        if isinstance(fit, dict) and "splits" in fit
     }
 
 

@@ -154,7 +154,8 @@ def test_a_small_run_prints_every_part():
     # Drake's checker has a context for each thread, and finds no winner in collision.
     assert texts["floor: checker's contexts; winners hit"] == ["2; 0"]
     parts = ("base check", "prefilter: too far", "inverse kinematics", "measure")
-    shares = [float(texts[p][0].split(" %")[0]) for p in (*parts, "collision of arm and gripper")]
+    parts = (*parts, "collision of arm and gripper")
+    shares = [float(texts[f"of it {part}"][0].split(" %")[0]) for part in parts]
     # The parts add up to the whole within the rounding to three digits, and none is zero.
     assert sum(shares) == pytest.approx(100.0, abs=0.01)
     assert min(shares) > 0.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from tcs.files.writing import scratch_folder
 from tcs.files.xml_documents import read_xml
 from tcs.model.robots.checks import check_robot
 from tcs.model.robots.draft_frames import on_floor, standing_bodies, with_goal_axes
-from tcs.model.robots.fitting import fit_robot
+from tcs.model.robots.fitting import fit_robot, tightened
 from tcs.model.robots.primitives import Primitive, write_primitives
 from tcs.model.robots.robot_file import (
     LEAST_JOINTS,
@@ -23,6 +23,7 @@ from tcs.model.robots.robot_file import (
 )
 from tcs.model.robots.self_collision import (
     DRAWS,
+    Blocked,
     blocked_at_boxes,
     blocked_by_shapes,
     free_posture,
@@ -35,6 +36,12 @@ from tcs.model.robots.urdf.surfaces import body_triangles
 
 _VERTICAL = 0.99
 """Cosine to the vertical above which a prismatic joint counts as torso joint."""
+
+_ALLOWED = 0.01
+"""Fraction of free postures that shapes may block before those of the bodies concerned are made
+tighter."""
+_SPLITS = 12
+"""Shapes of such a body that may be split in two."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,10 +162,14 @@ def draft_robot(
         rest = free_posture(robot)
         robot = robot.model_copy(update={"rest": rest or {}})
         robot, axes = with_goal_axes(robot)
-        blocked = blocked_by_shapes(robot)
-        steps.test_done()
-        at_boxes = blocked_at_boxes(robot)
-        steps.test_done()
+        found = _blocked(robot, steps)
+        if not options.coarse and max(by.fraction for by in found) > _ALLOWED:
+            primitives = tightened(robot, primitives, _to_tighten(model, primitives, found))
+            write_primitives(shapes, primitives)
+            steps.repeat(len(found))
+            # Others than those that chose the bodies.
+            found = _blocked(robot, steps, seed=1)
+        blocked, at_boxes = found
     worst = max(fits, key=lambda found: found.fit.excess)
     remarks = [
         f"arm: the {len(arm)} revolute joints nearest '{tool}', from '{arm_base}' on: "
@@ -182,6 +193,27 @@ def draft_robot(
     return Draft(robot=robot, primitives=primitives, remarks=tuple(remarks))
 
 
+def _blocked(robot: RobotFile, steps: _Steps, seed: int = 0) -> tuple[Blocked, Blocked]:
+    """Return what the shapes block by self-collision and at boxes although surfaces are free."""
+    blocked = blocked_by_shapes(robot, seed=seed)
+    steps.test_done()
+    at_boxes = blocked_at_boxes(robot, seed=seed)
+    steps.test_done()
+    return blocked, at_boxes
+
+
+def _to_tighten(
+    model: Urdf, shapes: Iterable[Primitive], found: Iterable[Blocked]
+) -> dict[str, int]:
+    """Return how many shapes to split of the bodies with meshes that block postures."""
+    blocking = {body for by in found for pair, _ in by.pairs for body in pair}
+    return {
+        shape.body: _SPLITS
+        for shape in shapes
+        if shape.body in blocking and any(g.mesh for g in model.links[shape.body])
+    }
+
+
 class _Steps:
     """Progress over bodies to fit and the tests that follow."""
 
@@ -200,6 +232,10 @@ class _Steps:
         """Report one more test."""
         self._done += 1
         self._tell()
+
+    def repeat(self, tests: int) -> None:
+        """Add tests that are done again."""
+        self._total += tests
 
     def _tell(self) -> None:
         if self._report is not None:

@@ -61,9 +61,10 @@ def test_a_rest_posture_is_found_where_zero_collides(tmp_path):
     )
     file = tmp_path / "walled.urdf"
     file.write_text(urdf().replace("</robot>", f"{wall}{carried}</robot>"))
-    robot = draft_robot(file, "tool").robot
+    draft = draft_robot(file, "tool")
+    robot = draft.robot
     assert set(robot.rest) == set(robot.arm_joints)
-    write_draft(draft_robot(file, "tool"), tmp_path / "mine.yaml")
+    write_draft(draft, tmp_path / "mine.yaml")
     robot = load_robot(tmp_path / "mine.yaml")
     off = {frozenset(pair) for pair in robot.disabled_pairs}
     still = robot.with_mimics(robot.joint_positions())

@@ -1,8 +1,8 @@
 """Fitting: boxes and capsules that enclose the meshes of a robot, and the check that they do.
 
 In: a robot file and the triangles of its meshes. Out: primitives for each body (`fit_robot`), more
-of them for some (`refit`) or for parts of some (`refit_parts`), and how those of a robot file
-enclose its surface (`enclosure`).
+of them for some (`refit`) or for parts of some (`refit_parts`), tighter ones (`tightened`), and how
+those of a robot file enclose its surface (`enclosure`).
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from tcs.model.robots.fitting.bodies import BodyFit, fit_robot, refit, refit_par
 from tcs.model.robots.fitting.covering import Target
 from tcs.model.robots.fitting.enclosure import BodyEnclosure, enclosure
 from tcs.model.robots.fitting.parts import Part
+from tcs.model.robots.fitting.tightening import tightened
 
 __all__ = [
     "BodyEnclosure",
@@ -22,4 +23,5 @@ __all__ = [
     "refit",
     "refit_parts",
     "target_of",
+    "tightened",
 ]

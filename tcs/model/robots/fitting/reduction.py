@@ -19,11 +19,11 @@ def contain(shapes: list[Primitive], pieces: FloatArray) -> BoolArray:
     """Return which pieces, shape (n, 3, 3), lie wholly in one of the shapes, shape (n,)."""
     within = np.zeros(len(pieces), np.bool_)
     for shape in shapes:
-        within |= _contained(shape, pieces)
+        within |= contained(shape, pieces)
     return within
 
 
-def _contained(shape: Primitive, pieces: FloatArray) -> BoolArray:
+def contained(shape: Primitive, pieces: FloatArray) -> BoolArray:
     """Return which pieces lie wholly in a shape, shape (n,)."""
     low, high = shape.bounds + np.array([[-_TOUCH], [_TOUCH]])
     first = pieces[:, 0]
@@ -53,10 +53,10 @@ def reduced(
         boxed: Whether a box may take the place of a capsule that contains little alone.
     """
 
-    def contained(shape: Primitive) -> BoolArray:
-        return np.concatenate([_contained(shape, pieces), shape.contains(inside)])
+    def holds(shape: Primitive) -> BoolArray:
+        return np.concatenate([contained(shape, pieces), shape.contains(inside)])
 
-    within = np.stack([contained(shape) for shape in shapes])
+    within = np.stack([holds(shape) for shape in shapes])
     bare = np.flatnonzero(~within[:, : len(pieces)].any(axis=0))
     if len(bare):
         away = np.stack([shape.distance(pieces[bare]).max(axis=1) for shape in shapes])
@@ -75,7 +75,7 @@ def reduced(
         if boxed and shapes[k].kind == "capsule":
             box = enclose(body, np.unique(points, axis=0), "box", shapes[k].rotation)
             current[k] = min(current[k], box, key=lambda shape: shape.volume)
-        within[k] = contained(current[k])
+        within[k] = holds(current[k])
     return list(current.values())
 
 

@@ -1,0 +1,104 @@
+"""Shapes made tighter: they enclose what they did, leave less outside, and never protrude anew."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from tcs.errors import RobotError, UnknownNameError
+from tcs.model.robots.fitting import tightening as module
+from tcs.model.robots.fitting.bounding import corner_points, enclose, enclose_axis
+from tcs.model.robots.fitting.tightening import Tightening, tightened
+from tcs.model.robots.primitives import enclosed, read_primitives, union_volume
+
+
+@pytest.fixture(autouse=True)
+def coarse(monkeypatch):
+    """A grid of 5 mm for drums of 20 cm, which is quick."""
+    monkeypatch.setattr(module, "ACROSS", 40)
+
+
+@pytest.fixture(scope="module")
+def steps():
+    """Two drums on one axis, one above the other."""
+    lower = trimesh.creation.cylinder(0.1, 0.1, sections=24)
+    upper = trimesh.creation.cylinder(0.06, 0.1, sections=24).apply_translation((0, 0, 0.1))
+    return np.concatenate([lower.triangles, upper.triangles])
+
+
+@pytest.fixture(scope="module")
+def wide(steps):
+    """A box around both drums, and a capsule around the upper one, with its caps beyond it."""
+    box = enclose("b", corner_points(steps), "box", np.eye(3))
+    capsule = enclose_axis("b", np.array([0, 0, 0.0]), np.array([0, 0, 0.2]), 0.07)
+    return box, capsule
+
+
+def test_each_shape_is_reduced_to_what_it_alone_contains(steps, wide):
+    tightening = Tightening("b", wide, steps)
+    before = tightening.excess
+    tightening.reduce()
+    assert enclosed(tightening.shapes, steps).all()
+    # The box leaves the upper drum to the capsule, whose caps end with the drum.
+    assert tightening.excess < 0.6 * before
+    assert union_volume(tightening.shapes) < 0.7 * union_volume(wide)
+
+
+def test_excess_is_the_volume_outside(steps, wide):
+    box, _ = wide
+    # Drums of 24 sides; a cell of the grid is 5 mm, and the surface fills those it crosses.
+    area = 12 * np.sin(2 * np.pi / 24)
+    drums = area * (0.1**2 * 0.1 + 0.06**2 * 0.1)
+    assert Tightening("b", (box,), steps).excess == pytest.approx(box.volume - drums, rel=0.1)
+
+
+def test_splits_follow_the_surface(steps, wide):
+    box, _ = wide
+    excess = []
+    for most in (0, 1, 3):
+        tightening = Tightening("b", (box,), steps)
+        tightening.split(most)
+        assert len(tightening.shapes) == 1 + most
+        assert enclosed(tightening.shapes, steps).all()
+        excess.append(tightening.excess)
+    # One cut between the drums leaves a square box around each: 4 / pi times as large.
+    assert excess[1] == pytest.approx(0.1 * (0.2**2 + 0.12**2) - 0.1 * np.pi * 0.0136, rel=0.15)
+    assert excess[2] < 0.8 * excess[1] < 0.8 * excess[0]
+
+
+def test_splits_of_a_capsule_never_protrude_more(steps):
+    capsule = enclose_axis("b", np.array([0, 0, -0.05]), np.array([0, 0, 0.15]), 0.15)
+    tightening = Tightening("b", (capsule,), steps)
+    excess = [tightening.excess]
+    for _ in range(4):
+        tightening.split(1)
+        excess.append(tightening.excess)
+    assert excess == sorted(excess, reverse=True)
+    assert excess[-1] < 0.7 * excess[0]
+    assert enclosed(tightening.shapes, steps).all()
+
+
+def test_a_box_that_fits_is_not_split():
+    solid = np.asarray(trimesh.creation.box((0.1, 0.2, 0.3)).triangles)
+    box = enclose("b", corner_points(solid), "box", np.eye(3))
+    tightening = Tightening("b", (box,), solid)
+    tightening.reduce()
+    tightening.split(5)
+    assert tightening.shapes == (box,)
+
+
+def test_shapes_that_leave_surface_bare_are_refused(steps, wide):
+    with pytest.raises(RobotError, match="'b' do not enclose its surface"):
+        Tightening("b", (wide[0].shrunk(0.01),), steps)
+
+
+def test_other_bodies_keep_their_shapes(pr2):
+    before = read_primitives(Path(pr2.primitives))
+    name = "l_gripper_l_finger_tip_link"
+    after = tightened(pr2, before, {name: 3})
+    assert [s for s in after if s.body != name] == [s for s in before if s.body != name]
+    own = [s for s in before if s.body == name]
+    assert union_volume(s for s in after if s.body == name) < union_volume(own)
+    with pytest.raises(UnknownNameError, match="Did you mean 'l_forearm_link'"):
+        tightened(pr2, before, {"l_forearm_lin": 3})
