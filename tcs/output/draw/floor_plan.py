@@ -23,8 +23,14 @@ from tcs.output.draw.solids import Category, Solid
 from tcs.output.words import member_text
 from tcs.placement.tables.place_map import FloatArray, PlaceMap
 
+IntArray = NDArray[np.int64]
+
 ARROW = 0.45
 """Length of a heading arrow [m]: it ends ahead of the front of a mobile robot."""
+LONGEST = 4.0
+"""Greatest ratio of the sides of a cell."""
+_SINGLE = 0.05
+"""Width of the cells along an axis with a single value [m]."""
 MARGIN = 0.05
 """Margin around what is shown [m]."""
 _EXCLUDED = "////"
@@ -59,21 +65,27 @@ def draw_cells(axes: Axes, places: PlaceMap, values: NDArray[np.float64], most: 
         values: Value of each base position, without a colour where it is 0, shape (X, Y).
         most: Value at the upper end of the scale.
     """
-    edges = (cell_edges(places.x), cell_edges(places.y))
-    blocked = np.ma.masked_where(places.free, np.ones(places.free.shape))
+    widths = cell_widths(places.x, places.y)
+    (x, columns), (y, rows) = (
+        _cells_and_gaps(at, width) for at, width in zip((places.x, places.y), widths, strict=True)
+    )
+    edges, at = (x, y), np.ix_(columns, rows)
+    gaps = (columns[:, None] < 0) | (rows[None] < 0)
+    blocked = np.ma.masked_where(places.free[at] | gaps, np.ones(gaps.shape))
     axes.pcolormesh(*edges, blocked.T, cmap=ListedColormap([BLOCKED]), rasterized=True)
     if places.excluded is not None:
+        excluded = places.excluded[at] & ~gaps
         corners = [
             [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
             for i, (x0, x1) in enumerate(pairwise(edges[0]))
             for j, (y0, y1) in enumerate(pairwise(edges[1]))
-            if places.excluded[i, j]
+            if excluded[i, j]
         ]
         hatched = PolyCollection(
             corners, facecolors=EMPTY, edgecolors=BLOCKED, hatch=_EXCLUDED, linewidths=0.0
         )
         axes.add_collection(hatched, autolim=False)
-    scored = np.ma.masked_less_equal(values, 0.0)
+    scored = np.ma.masked_where((values[at] <= 0.0) | gaps, values[at])
     return axes.pcolormesh(*edges, scored.T, cmap=SCALE, vmin=0.0, vmax=most, rasterized=True)
 
 
@@ -183,10 +195,23 @@ def frame(axes: Axes, points: Iterable[FloatArray], margin: float = MARGIN) -> N
     axes.set_ylim(low[1] - margin, high[1] + margin)
 
 
-def cell_edges(centres: FloatArray) -> FloatArray:
-    """Return the edges of cells around evenly spaced centres, one more than centres."""
-    step = float(centres[1] - centres[0]) if len(centres) > 1 else 0.05
-    return np.append(centres - step / 2.0, centres[-1] + step / 2.0)
+def cell_widths(x: FloatArray, y: FloatArray) -> tuple[float, float]:
+    """Return the widths of the cells around evenly spaced base positions [m].
+
+    They are the steps, but at most `LONGEST` times the smaller one: between two rails at the sides
+    of a chair there are no base positions.
+    """
+    steps = [float(at[1] - at[0]) if len(at) > 1 else _SINGLE for at in (x, y)]
+    return min(steps[0], LONGEST * steps[1]), min(steps[1], LONGEST * steps[0])
+
+
+def _cells_and_gaps(centres: FloatArray, width: float) -> tuple[FloatArray, IntArray]:
+    """Return the edges of cells, and the number of each cell, -1 for a gap between two."""
+    numbers = np.arange(len(centres))
+    if len(centres) < 2 or centres[1] - centres[0] <= width:
+        return np.append(centres - width / 2.0, centres[-1] + width / 2.0), numbers
+    edges = np.stack([centres - width / 2.0, centres + width / 2.0], axis=1).ravel()
+    return edges, np.stack([numbers, np.full_like(numbers, -1)], axis=1).ravel()[:-1]
 
 
 def legend_handles(

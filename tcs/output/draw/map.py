@@ -84,8 +84,9 @@ def draw_map(
 
 def _grid_and_environment(places: PlaceMap, environment: Sequence[Solid]) -> FloatArray:
     """Return the corners of the grid and of the environment within it [m], shape (n, 2)."""
-    edges = (floor_plan.cell_edges(places.x), floor_plan.cell_edges(places.y))
-    low, high = np.array([[edge[0], edge[-1]] for edge in edges]).T
+    half = np.array(floor_plan.cell_widths(places.x, places.y)) / 2.0
+    low = np.array([places.x[0], places.y[0]]) - half
+    high = np.array([places.x[-1], places.y[-1]]) + half
     around = [np.clip(s.footprint, low - _BEYOND, high + _BEYOND) for s in environment]
     return np.concatenate([np.stack([low, high]), *around])
 

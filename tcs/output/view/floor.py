@@ -10,6 +10,7 @@ from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
 from tcs.output.draw.colours import SCALE
+from tcs.output.draw.floor_plan import cell_widths
 from tcs.output.view.viewed_set import ViewedSet
 from tcs.output.words import REASON_COLOURS
 from tcs.placement.reasons.distribution import CHECKS
@@ -36,7 +37,7 @@ class FloorMap:
     places: FloatArray
     """x and y of their centres in W [m], shape (n, 2)."""
     half: tuple[float, float]
-    """Half the step of the grid along x and y [m]."""
+    """Half the widths of the cells along x and y [m]."""
     colours: FloatArray
     """Red, green, blue of each, 0 to 1, shape (n, 3)."""
 
@@ -75,7 +76,8 @@ def floor_map(viewed: ViewedSet, state: int, goal: int, colouring: str) -> Floor
         top = 1.0 if colouring == SUCCESS else float(values.max(initial=0.0)) or 1.0
         colours = matplotlib.colormaps[SCALE](values / top)[..., :3]
     middles = np.stack(np.meshgrid(places.x, places.y, indexing="ij"), axis=-1)
-    half = (grid.axis("base_x").step / 2.0, grid.axis("base_y").step / 2.0)
+    width, depth = cell_widths(places.x, places.y)
+    half = width / 2.0, depth / 2.0
     return FloorMap(places=middles[shown], half=half, colours=np.asarray(colours[shown]))
 
 

@@ -71,7 +71,7 @@ def test_success_is_shown_where_a_single_has_an_estimate(estimated):
 @pytest.mark.parametrize("colouring", ["reason", "manipulability"])
 def test_a_place_is_as_wide_as_the_step_of_the_grid(bed, colouring):
     steps = [bed.grid.axis(name).step for name in ("base_x", "base_y")]
-    assert floor_map(bed, 0, 0, colouring).half == tuple(step / 2 for step in steps)
+    assert floor_map(bed, 0, 0, colouring).half == pytest.approx([step / 2 for step in steps])
 
 
 def test_success_belongs_to_its_own_state_and_has_the_colour_of_its_value(bed):
