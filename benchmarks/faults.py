@@ -1,21 +1,22 @@
 """Damage cached machine code and interrupt commands at random moments; count what goes wrong.
 
-Usage: python benchmarks/faults.py [--flips 150] [--kernel-flips 20] [--signals 170] [--seed 0]
+Usage: python benchmarks/faults.py [--flips 150] [--kernel-flips 20] [--signals 200] [--seed 0]
 
 `--flips` damages one bit each in the machine code of small functions, `--kernel-flips` in that of
 the kernel, which `tcs score` then has to compile again. `--signals` starts tcs score (also with
-blocks), robustify, report and capability from-ik in turn and sends SIGINT, SIGTERM or SIGKILL at a
-random moment. Every count of a fault should be 0; the exit code is 1 if one is not.
+blocks), robustify, report, capability from-ik and population in turn and sends SIGINT, SIGTERM or
+SIGKILL at a random moment (`--only-kill`: SIGKILL alone). Unless `--no-conditions` is given, each
+of them also runs with a full disk, too little memory, no home and a folder that cannot be written,
+and `tcs score` beside another process with the same cold cache, and with a Dask worker that is
+killed. Every count of a fault should be 0; the exit code is 1 if one is not.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 import logging
 import os
 import random
-import shutil
 import signal
 import subprocess
 import sys
@@ -23,28 +24,27 @@ import tempfile
 import time
 import traceback
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-import yaml
+from fault_commands import (
+    CHECKOUT,
+    Command,
+    digest,
+    leftovers,
+    scoring_commands,
+    small_environment,
+)
+from fault_conditions import COLUMNS, conditions
+from fault_conditions import FAULTS as CONDITION_FAULTS
 from numba.core.registry import CPUDispatcher
 from table import header, parser, record, row, save
 
 import tcs
-from tcs.capability.files import load_map
 from tcs.kernel import machine_code
 from tcs.kernel.cache import jit, jit_folder
 
-CHECKOUT = Path(__file__).resolve().parents[1]
-TCS = (sys.executable, "-m", "tcs")
-GRID = {
-    "base_x": ("m", 0.95, 0.1, 4),
-    "base_y": ("m", -0.7, 0.7, 3),
-    "base_yaw": ("deg", 90, 45, 4),
-    "torso": ("m", 0.15, 0.15, 2),
-}
-"""96 configurations near a corner of the wheelchair: unit, start, step, count."""
 FAULTS = ("false results", "dead processes", "tracebacks", "not one warning", "not repaired")
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
 
@@ -54,7 +54,9 @@ def main() -> int:
     command_line = parser(__doc__)
     command_line.add_argument("--flips", type=int, default=150)
     command_line.add_argument("--kernel-flips", type=int, default=20)
-    command_line.add_argument("--signals", type=int, default=170)
+    command_line.add_argument("--signals", type=int, default=200)
+    command_line.add_argument("--only-kill", action="store_true")
+    command_line.add_argument("--no-conditions", action="store_true")
     command_line.add_argument("--seed", type=int, default=0)
     options = command_line.parse_args()
     header()
@@ -72,7 +74,10 @@ def main() -> int:
             faults += sum(found[fault] for fault in FAULTS)
         columns = ["", "tries", *FAULTS]
         record("bits", columns, [[n, *(f"{c[k]}" for k in columns[1:])] for n, c in lines])
-        faults += signals(folder / "signals", options.signals, rng)
+        numbers = SIGNALS[-1:] if options.only_kill else SIGNALS
+        faults += signals(folder / "signals", options.signals, rng, numbers)
+        if not options.no_conditions:
+            faults += starved(folder / "conditions")
     save(options)
     return 1 if faults else 0
 
@@ -255,59 +260,6 @@ def kernel_flips(folder: Path, tries: int, rng: random.Random) -> Counter[str]:
     return counts
 
 
-def small_environment(folder: Path) -> Path:
-    """Write the wheelchair on a small grid."""
-    grid = {
-        name: dict(zip(("unit", "start", "step", "count"), axis, strict=True))
-        for name, axis in GRID.items()
-    }
-    path = folder / "corner.yaml"
-    content = {"based_on": "wheelchair", "name": "corner", "title": "A corner", "grid": grid}
-    path.write_text(yaml.safe_dump(content, sort_keys=False))
-    return path
-
-
-@dataclass(frozen=True)
-class Command:
-    """A command to interrupt.
-
-    Attributes:
-        name: Its name in the table.
-        words: Its arguments; `{out}` is the file that it writes.
-        out: Name of that file.
-        keeps: Names of folders that it makes and keeps.
-    """
-
-    name: str
-    words: tuple[str, ...]
-    out: str
-    keeps: tuple[str, ...] = ()
-
-    def run(self, folder: Path, variables: dict[str, str]) -> subprocess.Popen[str]:
-        """Start the command in a folder."""
-        words = [word.format(out=folder / self.out) for word in self.words]
-        return subprocess.Popen(
-            [*TCS, *words],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-            cwd=folder,
-            env=variables,
-        )
-
-    def is_whole(self, folder: Path) -> bool:
-        """Return whether the file it writes is complete."""
-        path = folder / self.out
-        try:
-            if path.suffix == ".html":
-                return path.read_text().rstrip().endswith("</html>")
-            if path.suffix == ".icm":
-                return load_map(path) is not None
-            return bool(tcs.load(path).tables)
-        except (OSError, tcs.TcsError):
-            return False
-
-
 SIGNAL_COLUMNS = (
     "tries",
     "ended by the signal",
@@ -321,40 +273,39 @@ SIGNAL_COLUMNS = (
 )
 
 
-def signals(folder: Path, tries: int, rng: random.Random) -> int:
+def starved(folder: Path) -> int:
+    """Run commands where something is missing; return the number of faults."""
+    folder.mkdir()
+    environment, scores = small_scores(folder)
+    found = conditions(folder / "trials", environment, scores)
+    for name, counts in found.items():
+        row(name, ", ".join(f"{column} {counts[column]}" for column in COLUMNS))
+    rows = [[name, *(str(counts[c]) for c in COLUMNS)] for name, counts in found.items()]
+    record("conditions", ["", *COLUMNS], rows)
+    return sum(counts[fault] for counts in found.values() for fault in CONDITION_FAULTS)
+
+
+def small_scores(folder: Path) -> tuple[Path, Path]:
+    """Write a small environment and its scores into a folder."""
+    environment = small_environment(folder)
+    make = ("score", "shaving", "--environment", str(environment), "--out", "{out}")
+    variables = {**os.environ, "PYTHONPATH": str(CHECKOUT)}
+    Command("score", make, "scores.tcs").run(folder, variables).communicate()
+    return environment, folder / "scores.tcs"
+
+
+def signals(folder: Path, tries: int, rng: random.Random, numbers: Sequence[signal.Signals]) -> int:
     """Interrupt commands at random moments; return the number of faults."""
     if not tries:
         return 0
     folder.mkdir()
-    environment = small_environment(folder)
+    environment, scores = small_scores(folder)
     variables = {**os.environ, "PYTHONPATH": str(CHECKOUT)}
-    scores = folder / "scores.tcs"
-    make = ("score", "shaving", "--environment", str(environment))
-    subprocess.run([*TCS, *make, "--out", str(scores)], check=True, capture_output=True)
-    commands = (
-        Command("score", (*make, "--out", "{out}"), "out.tcs"),
-        Command(
-            "score --blocks",
-            (*make, "--blocks", "blocks", "--out", "{out}"),
-            "out.tcs",
-            keeps=("blocks",),
-        ),
-        Command("robustify", ("robustify", "{out}", "--sets", "40", "--samples", "64"), "out.tcs"),
-        Command(
-            "report",
-            ("report", str(scores), "--out", "{out}", "--pairs", "20", "--dense", "5"),
-            "out.html",
-        ),
-        Command(
-            "capability from-ik",
-            ("capability", "from-ik", "--out", "{out}", "--step", "0.2", "--yaw-bins", "8"),
-            "out.icm",
-        ),
-    )
+    commands = scoring_commands(environment, scores)
     rows, faults = [], 0
     for number, command in enumerate(commands):
         share = tries // len(commands) + (number < tries % len(commands))
-        found = interrupted(command, folder / str(number), share, variables, scores, rng)
+        found = interrupted(command, folder / str(number), share, variables, scores, rng, numbers)
         row(f"signals, {command.name}", ", ".join(f"{k} {found[k]}" for k in SIGNAL_COLUMNS))
         rows.append([command.name, *(str(found[column]) for column in SIGNAL_COLUMNS)])
         faults += sum(found[column] for column in (*SIGNAL_COLUMNS[2:6], *SIGNAL_COLUMNS[7:]))
@@ -369,21 +320,21 @@ def interrupted(
     variables: dict[str, str],
     scores: Path,
     rng: random.Random,
+    numbers: Sequence[signal.Signals],
 ) -> Counter[str]:
     """Interrupt one command at random moments between its start and its end."""
     counts: Counter[str] = Counter()
     temporary = folder / "tmp"
     temporary.mkdir(parents=True)
     variables = {**variables, "TMPDIR": str(temporary)}
-    if command.out.endswith(".tcs"):
-        shutil.copy(scores, folder / command.out)
+    command.prepare(folder, scores)
     begun = time.perf_counter()
     _, err = command.run(folder, variables).communicate()
     duration = time.perf_counter() - begun
     if not command.is_whole(folder):
         raise RuntimeError(f"{command.name} does not run: {err}")
     for _ in range(tries):
-        number, left = rng.choice(SIGNALS), leftovers(folder, command)
+        number, left = rng.choice(numbers), leftovers(folder, command)
         running = command.run(folder, variables)
         time.sleep(rng.uniform(0.0, duration))
         running.send_signal(number)
@@ -404,29 +355,10 @@ def interrupted(
             len(new)
         )
     command.run(folder, variables).communicate()
-    if command.name.startswith("score"):
-        counts["other scores in the end"] = digest(folder / command.out) != digest(scores)
+    if command.scores:
+        counts["other scores in the end"] += digest(folder / command.out) != digest(scores)
     counts["still there after the next run"] = len(leftovers(folder, command))
     return counts
-
-
-def digest(path: Path) -> bytes:
-    """Return a hash of the scores in a file."""
-    table = tcs.load(path).nominal.scores
-    arrays = (table.reason, table.dexterity, table.pair, table.arm_joints)
-    return hashlib.sha256(b"".join(array.tobytes() for array in arrays)).digest()
-
-
-def leftovers(folder: Path, command: Command) -> set[Path]:
-    """Return what is in the folder beside what the command writes."""
-    kept = [path for name in command.keeps for path in (folder / name).rglob("*")]
-    return {
-        path
-        for path in (*folder.iterdir(), *(folder / "tmp").iterdir(), *kept)
-        if path.name not in (command.out, "tmp", "lock", *command.keeps)
-        and path.suffix != ".block"
-        and not (path.is_dir() and path in kept)
-    }
 
 
 if __name__ == "__main__":

@@ -77,7 +77,7 @@ def judged(file_type: FileType, path: Path, number: int, score: bool) -> tuple[s
         return "traceback", traceback.format_exc()[-3000:]
 
 
-def _scored(task: Path, environment: Path, robot: Path) -> tuple[str, str]:
+def _scored(task: Path, environment: Path, robot: Path | str) -> tuple[str, str]:
     """Score an accepted file and let Drake re-check some of the answers."""
     import tcs
     from tcs.placement.scoring.job import load_job

@@ -107,7 +107,7 @@ MESHES = """\
 <mesh filename="{file}" scale="1 1 1"/></geometry></visual></link></robot>
 """
 
-Scored = tuple[Path, Path, Path]
+Scored = tuple[Path, Path, Path | str]
 """Task, environment and robot of an accepted file, to be scored and re-checked."""
 
 
@@ -373,7 +373,8 @@ def _unchanged_scene(folder: Path) -> Any:
 
 
 @cache
-def _reach() -> Any:
+def default_reach() -> Any:
+    """Return the reach of the PR2, made once."""
     from tcs.capability import Reach
 
     return Reach.load("pr2", step=0.1)
@@ -389,7 +390,7 @@ def _errors(path: Path, _: int) -> None:
 def _head(path: Path, _: int) -> None:
     from tcs.capability.head import head_view
 
-    reach = _reach()
+    reach = default_reach()
     head_view(reach.scene, reach.torso_height, path)
 
 
@@ -436,7 +437,7 @@ def _run(path: Path, number: int) -> None:
 def _recording(path: Path, _: int) -> None:
     from tcs.capability import MapGrid, map_from_recording, read_csv
 
-    reach = _reach()
+    reach = default_reach()
     recording = read_csv(path, reach.robot, drop_bad=True)
     map_from_recording(reach, MapGrid.of(0.1, 8, "all"), recording)
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import fuzz_mutations as mutations
 import numpy as np
-from fuzz_files import FILE_TYPES, FileType, Scored, three
+from fuzz_files import FILE_TYPES, FileType, Scored, default_reach, three
 from fuzz_files import prepare as prepare_files
 
 from tcs.files.paths import data_folder
@@ -23,11 +23,11 @@ posture: {head_turn_deg: 10, elbow_flexion_left_deg: 20}
 """
 
 CONSTRAINTS = """\
-only: ["base_x >= -0.5", "base_yaw_deg = 0..180 deg"]
+only: ["base_x >= -0.7 m", "base_yaw = 0..180 deg"]
 keep: [torso]
 forbid: ["0.9 -1, 1.2 -1, 1.2 -0.5, 0.9 -0.5", [[3, 3], [4, 3], [4, 4]]]
-blocked: ["0.3 0.9 0.3 0.3 20"]
-prefer: [left]
+blocked: ["3 0.9 0.3 0.3 20"]
+prefer: ["base_x < -0.7 m"]
 """
 
 PLY = """\
@@ -93,7 +93,7 @@ def _write_motions(folder: Path) -> None:
     from tcs.placement.store import save_motions
 
     scores = tcs.load(folder / "scores.tcs")
-    save_motions(folder / "scores.motions", examine(scores, seed=0))
+    save_motions(folder / "scores.tcs.motions", examine(scores, seed=0))
     save_plan(folder / "plan.json", plan(scores, scores.nominal.sets.best, seed=0))
     with tempfile.TemporaryDirectory(dir=folder) as blocks:
         tcs.score(*three(folder), blocks=BlockFolder(Path(blocks)))
@@ -215,10 +215,9 @@ def _read_block(path: Path) -> Any:
 
 
 def _bag(path: Path, _: int) -> None:
-    from tcs.capability import MapGrid, Reach, map_from_recording
+    from tcs.capability import MapGrid, map_from_recording
 
-    reach = Reach.load("pr2", step=0.1)
-    map_from_recording(reach, MapGrid.of(0.1, 8, "all"), _read_bag(path))
+    map_from_recording(default_reach(), MapGrid.of(0.1, 8, "all"), _read_bag(path))
 
 
 def _person(path: Path, number: int) -> None:
@@ -236,7 +235,7 @@ def _tool(path: Path, _: int) -> Scored:
     task, kitchen, _ = three(path.parent)
     robot = holding("iiwa7", path)
     load_robot(robot)
-    return task, kitchen, Path(robot)
+    return task, kitchen, robot
 
 
 def _constraints(path: Path, _: int) -> None:
@@ -251,7 +250,7 @@ def _motions(path: Path, _: int) -> None:
     import tcs
     from tcs.placement.store import motions_of
 
-    motions_of(tcs.load(path.parent / "scores.tcs"), path.with_suffix(".tcs"))
+    motions_of(tcs.load(path.parent / "scores.tcs"), path.with_suffix(""))
 
 
 def _plan(path: Path, number: int) -> None:
@@ -286,7 +285,9 @@ ALL_TYPES = (
         "points (PLY)", "cloud.ply", mutations.obj_mutated, _read_cloud, _read_only(_read_cloud)
     ),
     FileType("points (NPY)", "cloud.npy", npy_mutated, _read_cloud, _read_only(_read_cloud)),
-    FileType("motion file", "scores.motions", mutations.joblib_mutated, _read_motions, _motions),
+    FileType(
+        "motion file", "scores.tcs.motions", mutations.joblib_mutated, _read_motions, _motions
+    ),
     FileType("plan (JSON)", "plan.json", json_mutated, _read_plan, _plan),
     FileType("block", "kept.block", mutations.joblib_mutated, _read_block, _read_only(_read_block)),
 )

@@ -84,6 +84,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "lines": (),
     "pick_and_place": (),
     "engines": (),
+    "scale": (),
     "faults": (),
     "edges": (),
     "fuzz": ("--mutants", "5000"),

@@ -51,7 +51,7 @@ def folder(scripts, tmp_path_factory):
     scores = score_file()
     save_scores(made_in / "scores.tcs", scores)
     sets = scores.nominal.sets
-    save_motions(made_in / "scores.motions", motion_file(motion_table(sets, sets.reached)))
+    save_motions(made_in / "scores.tcs.motions", motion_file(motion_table(sets, sets.reached)))
     save_plan(made_in / "plan.json", small_plan())
     write_block(made_in / "kept.block", scripts[1].BLOCK)
     save_map(made_in / "map.tcm", small_map([[0, 0, 0, 0, 0], [1, 2, 3, 4, 1]], [0.5, 0.2], [1, 1]))

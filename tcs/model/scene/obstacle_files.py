@@ -40,7 +40,9 @@ def cloud_points(file: Path, scale: float, where: str) -> FloatArray:
         else:
             import trimesh
 
-            loaded: Any = trimesh.load(io.BytesIO(content), file_type="ply", process=False)
+            # Numbers that its types cannot hold become infinite, which is refused below.
+            with np.errstate(over="ignore", invalid="ignore"):
+                loaded: Any = trimesh.load(io.BytesIO(content), file_type="ply", process=False)
             read = loaded.vertices
         points = np.asarray(read, dtype=np.float64)
     except Exception as error:  # readers raise errors of many classes

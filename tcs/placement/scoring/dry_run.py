@@ -52,20 +52,21 @@ class Estimate:
         return asdict(self)
 
 
-def estimate(job: Job, *, measure: str, jobs: int) -> Estimate:
+def estimate(job: Job, *, measure: str, jobs: int, slices: int = SAMPLES) -> Estimate:
     """Estimate what scoring a job would take.
 
     Args:
         job: The job.
         measure: Name of the dexterity measure.
         jobs: Number of threads; the time is that of one thread divided by it.
+        slices: Greatest number of slices to score.
     """
     lowered = job.lowered(job.scene())
     problem = build_problem(lowered.arrays, lowered.grid, measure)
     warm_up(problem)
     work = Work(problem, gripper_contacts(problem))
     size, goals = job.scored_grid.size, len(job.task.goals)
-    starts = np.unique(np.linspace(0, max(0, size - SLICE), SAMPLES).astype(int))
+    starts = np.unique(np.linspace(0, max(0, size - SLICE), slices).astype(int))
     seconds, joints, disk, scored = [], 0, 0, 0
     for start in starts.tolist():
         begun = time.thread_time()
@@ -74,7 +75,7 @@ def estimate(job: Job, *, measure: str, jobs: int) -> Estimate:
         scored += len(block.reason)
         joints += block.joints.nbytes
         disk += _stored_bytes(block)
-    slices = size / SLICE / jobs
+    all_slices = size / SLICE / jobs
     arrays = [size * goals * width for width in PAIR_BYTES]
     mapped = sum(array for array in arrays if array >= LEAST_BYTES)
     spread = float(np.std(seconds, ddof=1)) if len(seconds) > 1 else 0.0
@@ -86,7 +87,7 @@ def estimate(job: Job, *, measure: str, jobs: int) -> Estimate:
         goals=goals,
         blocks=-(-size // BLOCK),
         scoring_seconds=sum(seconds) / scored * size / jobs,
-        scoring_seconds_error=slices * spread / len(seconds) ** 0.5,
+        scoring_seconds_error=all_slices * spread / len(seconds) ** 0.5,
         memory_bytes=sum(arrays) - mapped + round(joints / scored * size),
         scratch_bytes=mapped,
         disk_bytes=round(disk / scored * size),

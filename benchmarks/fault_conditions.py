@@ -1,0 +1,181 @@
+"""Commands on machines that lack something: disk, memory, a home, a warm cache, a worker."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import tempfile
+import threading
+from collections import Counter
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from fault_commands import CHECKOUT, Command, digest, leftovers, scoring_commands
+
+COLUMNS = (
+    "tries",
+    "done all the same",
+    "one line",
+    "files lost or half-written",
+    "tracebacks or other lines",
+    "left over",
+    "other scores in the end",
+)
+"""Counts of each condition; the last four are faults."""
+
+MEGABYTE = 1024**2
+LIMIT_MEMORY = (500, 700, 900, 1200, 1600)
+"""Address space of a process [MB]: from less than the imports take to enough."""
+LIMIT_FILE = (1, 4, 10_000, 30_000)
+"""Largest file that can be written [bytes]: a disk that is full after so many."""
+FAULTS = COLUMNS[3:]
+
+
+def limited(kind: int, most: int) -> Callable[[], None]:
+    """Return what sets a limit of a process before it starts."""
+    return lambda: resource.setrlimit(kind, (most, most))
+
+
+def conditions(folder: Path, environment: Path, scores: Path) -> dict[str, Counter[str]]:
+    """Return the counts of every condition, by its name.
+
+    Args:
+        folder: Folder to make for the trials.
+        environment: A small environment.
+        scores: Its scores, made without any condition.
+    """
+    folder.mkdir()
+    plain = {**os.environ, "PYTHONPATH": str(CHECKOUT)}
+    commands = scoring_commands(environment, scores)
+    found: dict[str, Counter[str]] = {}
+
+    def count(name: str, command: Command, variables: Mapping[str, str], **limits: object) -> None:
+        counts = found.setdefault(name, Counter(dict.fromkeys(COLUMNS, 0)))
+        with tempfile.TemporaryDirectory(dir=folder) as made:
+            counts.update(tried(command, Path(made), dict(variables), plain, scores, **limits))
+
+    for command in commands:
+        for most in LIMIT_FILE:
+            limit = limited(resource.RLIMIT_FSIZE, most)
+            count("files cannot grow (full disk)", command, plain, preexec_fn=limit)
+        for most in LIMIT_MEMORY:
+            limit = limited(resource.RLIMIT_AS, most * MEGABYTE)
+            count("too little memory", command, plain, preexec_fn=limit)
+        count("no home", command, without_home(plain))
+        count("folder that cannot be written", command.writing_to(Path("/proc")), plain)
+    found["two processes, one cold cache"] = cold_cache(folder / "cold", commands[0], plain, scores)
+    found["Dask worker killed"] = killed_worker(folder / "dask", commands[0], plain, scores)
+    return found
+
+
+def without_home(variables: Mapping[str, str]) -> dict[str, str]:
+    """Return variables that name neither a home nor a folder for caches."""
+    names = ("HOME", "TCS_CACHE_DIR", "XDG_CACHE_HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME")
+    return {name: value for name, value in variables.items() if name not in names}
+
+
+def tried(
+    command: Command,
+    folder: Path,
+    variables: dict[str, str],
+    plain: dict[str, str],
+    scores: Path,
+    **limits: object,
+) -> Counter[str]:
+    """Run a command under a condition and then without; return what was wrong."""
+    temporary = folder / "tmp"
+    temporary.mkdir()
+    command.prepare(folder, scores)
+    before = leftovers(folder, command)
+    running = command.run(folder, {**variables, "TMPDIR": str(temporary)}, **limits)
+    _, err = running.communicate()
+    counts = Counter(judged(running.returncode, err))
+    counts["files lost or half-written"] += not command.is_old_or_new(folder)
+    counts["left over"] += len(leftovers(folder, command) - before)
+    counts["other scores in the end"] += not ends_the_same(command, folder, plain, scores)
+    return counts
+
+
+def judged(code: int, err: str) -> dict[str, int]:
+    """Return the counts of how a process ended."""
+    # Without a place for machine code every run compiles, and says so.
+    lines = [line for line in err.splitlines() if not is_note(line)]
+    fine = (code == 0 and not lines) or (code == 1 and len(lines) == 1)
+    if not fine:
+        print(f"    exit code {code}: {err[-600:]!r}", flush=True)
+    return {
+        "tries": 1,
+        "done all the same": code == 0,
+        "one line": code == 1 and len(lines) == 1,
+        "tracebacks or other lines": not fine,
+    }
+
+
+def is_note(line: str) -> bool:
+    """Return whether a line only says that code is compiled, or is not kept."""
+    return "compiling for this" in line or "machine code" in line.lower()
+
+
+def ends_the_same(command: Command, folder: Path, plain: dict[str, str], scores: Path) -> bool:
+    """Return whether the command ends its work when nothing is missing any more."""
+    again = command.writing_to(None)
+    _, err = again.run(folder, plain).communicate()
+    if not again.is_whole(folder):
+        print(f"    {command.name}, afterwards: {err[-600:]!r}", flush=True)
+        return False
+    return not again.scores or digest(folder / again.out) == digest(scores)
+
+
+def cold_cache(folder: Path, command: Command, plain: dict[str, str], scores: Path) -> Counter[str]:
+    """Start two processes at once that have to compile into the same empty cache."""
+    folder.mkdir()
+    variables = {**plain, "TCS_CACHE_DIR": str(folder / "cache")}
+    counts: Counter[str] = Counter(dict.fromkeys(COLUMNS, 0))
+    folders = [folder / name for name in ("one", "two")]
+    running = []
+    for one in folders:
+        (one / "tmp").mkdir(parents=True)
+        running.append(command.run(one, {**variables, "TMPDIR": str(one / "tmp")}))
+    for one, process in zip(folders, running, strict=True):
+        _, err = process.communicate()
+        counts.update(judged(process.returncode, err))
+        counts["files lost or half-written"] += not command.is_whole(one)
+        counts["left over"] += len(leftovers(one, command))
+        counts["other scores in the end"] += not ends_the_same(command, one, variables, scores)
+    return counts
+
+
+def killed_worker(
+    folder: Path, command: Command, plain: dict[str, str], scores: Path
+) -> Counter[str]:
+    """Kill one of two Dask workers while they score."""
+    from distributed import LocalCluster
+
+    (folder / "tmp").mkdir(parents=True)
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster:
+        words = ("--engine", "dask", "--scheduler", cluster.scheduler_address)
+        by_dask = command.with_words(words)
+        stop = threading.Event()
+
+        def kill() -> None:
+            """Kill a worker as soon as it has been sent work."""
+            while not stop.wait(0.02):
+                tasks = cluster.scheduler.tasks.values()
+                if any(task.state == "processing" for task in tasks):
+                    (nanny, *_) = cluster.workers.values()
+                    if nanny.pid:
+                        os.kill(nanny.pid, signal.SIGKILL)
+                    return
+
+        killer = threading.Thread(target=kill)
+        killer.start()
+        process = by_dask.run(folder, {**plain, "TMPDIR": str(folder / "tmp")})
+        _, err = process.communicate()
+        stop.set()
+        killer.join()
+    counts = Counter({**dict.fromkeys(COLUMNS, 0), **judged(process.returncode, err)})
+    counts["files lost or half-written"] += not by_dask.is_old_or_new(folder)
+    counts["left over"] += len(leftovers(folder, command))
+    counts["other scores in the end"] += not ends_the_same(command, folder, plain, scores)
+    return counts
