@@ -58,7 +58,16 @@ def peers(*arguments: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.parametrize(
     "script",
     [
-        *("faults.py", "live.py", "numeric_arms.py", "robots.py", "rows.py", "run.py"),
+        *(
+            "campaign.py",
+            "scale.py",
+            "faults.py",
+            "live.py",
+            "numeric_arms.py",
+            "robots.py",
+            "rows.py",
+            "run.py",
+        ),
         *("constraints.py", "motion.py", "planning.py", "selection.py", "teleop.py"),
     ],
 )

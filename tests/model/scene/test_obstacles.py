@@ -134,6 +134,15 @@ def test_clouds_that_cannot_be_used_are_one_line(tmp_path, array, message):
     assert "\n" not in str(error.value)
 
 
+def test_a_ply_with_a_number_beyond_its_type_is_one_line_without_a_warning(tmp_path):
+    rows = ["0 0 0"] * 20 + ["1e300 0 0"]
+    properties = "".join(f"property float {axis}\n" for axis in "xyz")
+    head = f"ply\nformat ascii 1.0\nelement vertex {len(rows)}\n{properties}end_header\n"
+    (tmp_path / "scan.ply").write_text(head + "\n".join(rows) + "\n")
+    with pytest.raises(EnvironmentFileError, match="coordinate"):
+        environment_shapes(environment(tmp_path, "name: scan, file: scan.ply"))
+
+
 @pytest.mark.parametrize(
     ("obstacle", "message"),
     [
