@@ -30,6 +30,8 @@ RESOLUTION = 8e-3
 """Difference from the greatest relaxed isotropy at which branching ends."""
 MOST_BOXES = 60_000
 """Boxes evaluated at a time; with more, branching ends earlier and the bounds are greater."""
+MIDDLES = 200
+"""Boxes whose middles are evaluated for each goal, those with the greatest bounds."""
 SLACK = 1e-6
 """Widening of heights [m] and angles [rad], above all rounding."""
 
@@ -77,13 +79,17 @@ class GoalLimits:
             np.arccos(np.clip(up * R_W7[:, 2, 2], -1.0, 1.0)),
         )
 
-    def allowed(self, goal: int, chain: Chain, boxes: Interval) -> tuple[BoolArray, BoolArray]:
+    def allowed(self, goal: int, height: Interval, along: Interval) -> tuple[BoolArray, BoolArray]:
         """Return which boxes a goal allows, and which of `ANGLES` in them.
+
+        Args:
+            goal: Number of the goal.
+            height: `wrist_height` of the boxes, shape (n,).
+            along: `forearm` of the boxes.
 
         Returns:
             Shapes (n,) and (n, intervals).
         """
-        height, along = wrist_height(chain, boxes), forearm(chain, boxes)
         fits = (height.high >= self.low[goal]) & (height.low <= self.high[goal])
         near = np.arccos(np.clip(along.high, -1.0, 1.0))
         far = np.arccos(np.clip(along.low, -1.0, 1.0))
@@ -110,10 +116,12 @@ def goal_bounds(chain: Chain, limits: GoalLimits, resolution: float = RESOLUTION
     boxes, goals = first_boxes(chain), range(limits.tilt.size)
     taken = np.zeros(limits.tilt.size)
     while True:
-        middle = (boxes.low + boxes.high) / 2.0
+        bounds = _bounds(chain, limits, boxes)
+        # What a box cannot be shown to stay below: a value in the middle of one of the best.
+        best = np.unique(np.argsort(-bounds, axis=0, kind="stable")[:MIDDLES])
+        middle = (boxes.low[best] + boxes.high[best]) / 2.0
         at_middle = _bounds(chain, limits, Interval(middle, middle))
         taken = np.maximum(taken, at_middle.max(axis=0, initial=0.0))
-        bounds = _bounds(chain, limits, boxes)
         found = np.maximum(bounds.max(axis=0, initial=0.0), taken + resolution)
         is_open = np.zeros(len(bounds), dtype=np.bool_)
         for goal in goals:
@@ -126,8 +134,9 @@ def goal_bounds(chain: Chain, limits: GoalLimits, resolution: float = RESOLUTION
 def _bounds(chain: Chain, limits: GoalLimits, boxes: Interval) -> FloatArray:
     """Return the relaxed isotropy that each goal allows in each box, 0 for none, shape (n, G)."""
     relaxed = relaxed_by_angle(chain, boxes)
+    height, along = wrist_height(chain, boxes), forearm(chain, boxes)
     found = np.zeros((len(relaxed), limits.tilt.size))
     for goal in range(limits.tilt.size):
-        fits, angles = limits.allowed(goal, chain, boxes)
+        fits, angles = limits.allowed(goal, height, along)
         found[:, goal] = np.where(fits, np.where(angles, relaxed, 0.0).max(axis=1), 0.0)
     return found

@@ -13,6 +13,8 @@ from tcs.placement.refinement.dexterity_bound import (
     _relaxed,
     descent,
     dexterity_bound,
+    forearm,
+    wrist_height,
 )
 from tcs.placement.refinement.goal_bound import GoalLimits, goal_bounds
 from tcs.placement.refinement.intervals import Interval, cosine
@@ -166,7 +168,8 @@ def test_the_box_of_a_posture_is_allowed_with_the_angle_of_its_wrist(lowered, rn
     at = np.searchsorted(ANGLES, np.arccos(np.abs(cosine_57)), side="right") - 1
     left_out = 0.0
     for goal in range(len(q)):
-        fits, angles = limits.allowed(goal, chain, box.rows(np.array([goal])))
+        of_goal = box.rows(np.array([goal]))
+        fits, angles = limits.allowed(goal, wrist_height(chain, of_goal), forearm(chain, of_goal))
         assert fits[0]
         assert angles[0, at[goal]]
         left_out += np.mean(~angles) / len(q)
