@@ -69,6 +69,21 @@ class Bounds:
                 bounds[~legs.reachable[cells]] = -np.inf
         return bounds
 
+    def of_cells(self) -> FloatArray:
+        """Return a bound on the utility of the groups whose nearest cell is each, shape (N,).
+
+        A tour drives to the nearest of its cells, and from there through the others. It is computed
+        by other operations than `groups`, and may be less by the rounding.
+        """
+        legs, index = self.legs, self.index
+        per_metre = self.travel * legs.metre
+        weights = (float(self.weights.reachability), float(self.weights.manipulability))
+        most = index.most_of_cells(
+            (*weights, per_metre, type(legs.distances)),
+            lambda: self._gain(*index.group_scores) - per_metre * index.path(legs.distances),
+        )
+        return np.where(legs.reachable, most - self.travel * legs.here_to_cell, -np.inf)
+
     def of_member(self, group: IntArray, member: IntArray) -> FloatArray:
         """Return bounds on the sets of a group that contain a candidate, shape (n,)."""
         return self._net_of(self._group_gain[group], group, member)

@@ -9,7 +9,7 @@ the scores of the others are computed.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,6 +29,16 @@ so that a search that opens many groups does not spend its time on bookkeeping."
 
 MOST_CANDIDATES = 100_000
 """Most candidates examined in one round: a few milliseconds."""
+
+FIRST_CELLS = 4
+"""Base cells whose groups are examined first, those with the greatest bounds."""
+
+MOST_CELLS = 0.25
+"""Fraction of the cells above which their groups are not picked out, but all are examined."""
+
+ROUNDING = 1e-9
+"""Relative margin of the bounds of cells, some thousand times their rounding: it opens a few groups
+more, whose own bounds are exact."""
 
 CHUNK = 500_000
 """Sets, or parts of them, formed together: their scores need some 30 MB."""
@@ -59,8 +69,32 @@ def best_set(bounds: Bounds, to_beat: float) -> Found | None:
     Returns:
         The set, or None when no set is better than `to_beat`.
     """
-    remaining = np.flatnonzero(bounds.groups > to_beat)
-    search = _Search(bounds, to_beat)
+    if bounds.lowered is not None:
+        # What the constraints leave bounds the groups tighter than their cells.
+        return _best_among(bounds, to_beat, None)
+    # Few cells are the nearest one of a good set: the bounds of the other groups are not needed.
+    of_cells = bounds.of_cells()
+    most = min(FIRST_CELLS, of_cells.size)
+    first = np.argpartition(-of_cells, most - 1)[:most]
+    rows = bounds.index.groups_of(first)
+    best = _best_among(replace(bounds, index=bounds.index.part(rows)), to_beat, None)
+    least = to_beat if best is None else best.utility
+    margin = ROUNDING * (1.0 + abs(least) + bounds.travel * float(bounds.legs.here_to_cell.max()))
+    is_left = of_cells >= least - margin
+    is_left[first] = False
+    left = np.flatnonzero(is_left)
+    if not left.size:
+        return best
+    if left.size > MOST_CELLS * of_cells.size:
+        return _best_among(bounds, to_beat, best)
+    rows = bounds.index.groups_of(left)
+    return _best_among(replace(bounds, index=bounds.index.part(rows)), to_beat, best)
+
+
+def _best_among(bounds: Bounds, to_beat: float, best: Found | None) -> Found | None:
+    """Return the best set of the groups of some bounds, or the best one so far."""
+    remaining = _promising(bounds, np.flatnonzero(bounds.groups > to_beat), best)
+    search = _Search(bounds, to_beat, best)
     budget = FIRST_CANDIDATES
     while remaining.size:
         now, remaining = _split(bounds, remaining, budget)
