@@ -43,6 +43,14 @@ class SuccessFloor:
         size = np.array([len(points.values) > 1 for points in sets], dtype=np.int64)
         return np.asarray(found >= self.least[size] - SLACK)
 
+    def keeps_of_sets(self, sets: Sequence[Points]) -> BoolArray:
+        """Return which sets are at least as sure as the best set of the grid, whatever their size.
+
+        Returns:
+            Shape (n,).
+        """
+        return np.asarray(successes(self.samples, self.weights, sets) >= self.least[1] - SLACK)
+
 
 def successes(samples: Samples, weights: FloatArray, sets: Sequence[Points]) -> FloatArray:
     """Return the mean of P_R of sets over samples, shape (n,)."""

@@ -26,7 +26,7 @@ from tcs.placement.refinement.objectives import (
 )
 from tcs.placement.refinement.perturbed import PerturbedPoints
 from tcs.placement.refinement.points import Points, PointScorer
-from tcs.placement.refinement.search import LocalSearch, Walk
+from tcs.placement.refinement.search import LocalSearch, Walk, without_idle_members
 from tcs.placement.refinement.space import Space
 from tcs.placement.robustness import Trials
 from tcs.placement.selection import Top, UtilityWeights, select
@@ -148,9 +148,15 @@ def refine(
     walks, scored = search.run(starts_at, rounds, on_progress or (lambda done, total: None))
     judging = draw(FRESH_SAMPLES, CHECK_STREAM)
     fresh = RememberedSamples(judging)
+    needed = None
     if keep:
-        screen = _floor(search, fresh.hardest(FRESH_SAMPLES // HARDEST), sets)
-        walks = settled(walks, screen, _floor(search, fresh, sets))
+        screen, judge = (
+            _floor(search, of, sets) for of in (fresh.hardest(FRESH_SAMPLES // HARDEST), fresh)
+        )
+        walks = settled(walks, screen, judge)
+        needed = judge.keeps_of_sets
+    first = without_idle_members(walks[0], search.objective, needed)
+    walks = [first, *walks[1:]]
     refined = _as_table(walks, sets.weights)
     success = None if is_scored and not keep else _success(search, walks[0], fresh, sets)
     ball = _ball(search, walks[0], judging, sets) if objective == "ball" else None

@@ -293,6 +293,26 @@ class LocalSearch:
         return values
 
 
+def without_idle_members(walk: Walk, objective: Objective, keeps: Condition | None = None) -> Walk:
+    """Return a walk without members that add nothing to the objective; itself if all add something.
+
+    Args:
+        walk: The walk.
+        objective: The objective.
+        keeps: Condition of the sets with fewer members; None for none.
+    """
+    for i in range(walk.members if walk.members > 1 else 0):
+        others = [k for k in range(walk.members) if k != i]
+        present = walk.present.rows(np.array(others))
+        reached, dexterity = present.features
+        value = float(objective.values(Features(reached[None], dexterity[None]))[0])
+        if value < walk.value - GAIN or not (keeps is None or keeps([present.points])[0]):
+            continue
+        fewer = Walk(tuple(walk.origin[k] for k in others), present, value, walk.width)
+        return without_idle_members(fewer, objective, keeps)
+    return walk
+
+
 def _best_of(walks: Sequence[Walk]) -> list[Walk]:
     """Return the best walks, and the best of one member."""
     order = sorted(walks, key=lambda walk: -walk.value)
