@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.freedom.forms import COLUMNS, free_goals
@@ -164,3 +165,14 @@ def test_a_nominal_goal_beside_a_free_one_keeps_its_score():
         mixed, 1, offset(free_goals(mixed.freedom, CHAIN).form[1], np.array([1.0, 0.2, 0, 0, 0, 0]))
     )
     assert np.abs(moved.goal_R[:, 1] - scene.goal_R[:, 1]).max() > 0.1
+
+
+def test_samples_of_any_orientation_leave_no_wide_gap():
+    """Half of all orientations are within 25 degrees of a sample; with 96 samples, within 30."""
+    goals = free_goals(FREEDOMS["orientation"].row()[None], CHAIN)
+    samples = Rotation.from_matrix(
+        [offset(goals.form[0], u)[0] for u in goals.u[: goals.samples[0]]]
+    )
+    drawn = Rotation.random(300, random_state=1)
+    nearest = [np.degrees((samples.inv() * one).magnitude().min()) for one in drawn]
+    assert np.median(nearest) < 25.0
