@@ -10,7 +10,13 @@ from typing import Any
 import numpy as np
 
 from tcs.model.grid import Grid, InitialConfiguration
-from tcs.output.words import REASON_TEXTS, frame_name, pair_text, relative_place
+from tcs.output.words import (
+    REASON_TEXTS,
+    frame_name,
+    frames_of_state,
+    pair_text,
+    relative_place,
+)
 from tcs.placement.reasons import nearest_configuration
 from tcs.placement.store import ScoreFile
 from tcs.placement.tables import Reason, ScoreTable
@@ -59,15 +65,6 @@ def settings_of_state(grid: Grid, state: int) -> dict[str, float]:
     plain = grid.configuration(state * grid.state_size).to_json()
     axes = {f"{a.name}_deg" if a.unit == "deg" else a.name for a in grid.environment_axes}
     return {name: value for name, value in plain.items() if name in axes}
-
-
-def frames_of_state(file: ScoreFile, table: int, state: int) -> dict[str, list[float]]:
-    """Return the positions of the body frames in a state of the environment [m]."""
-    count = len(file.tables)
-    return {
-        name: np.reshape(at, (count, -1, 3))[table, state].tolist()
-        for name, at in file.body_frames.items()
-    }
 
 
 def outcome_of(

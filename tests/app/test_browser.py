@@ -95,6 +95,75 @@ def test_a_click_moves_the_robot_and_why_explains(page):
     assert script("return document.activeElement.id") == "why"
 
 
+def scored_again(page, do):
+    """Do something that changes the scene, and wait until it is scored again."""
+    script = page.driver.execute_script
+    script("delete document.body.dataset.rescored")
+    do()
+    page.wait(lambda: script("return document.body.dataset.rescored"))
+    assert script("return document.getElementById('fault').textContent") == ""
+    assert script("return document.getElementById('changed').textContent").startswith("Scored in")
+
+
+def test_the_scene_is_changed_by_pointer_and_keys_and_scored_again(page):
+    from selenium.webdriver import ActionChains
+
+    script = page.driver.execute_script
+    page.wait(lambda: not script("return document.getElementById('editing').hidden"))
+    shown = "return document.querySelector('#map image').getAttribute('href')"
+    before = script(shown)
+    person = page.driver.find_element("css selector", ".thing[data-name=person] > polygon")
+    script("document.getElementById('map').scrollIntoView({block: 'center'})")
+    drag = ActionChains(page.driver).move_to_element(person).click_and_hold()
+    scored_again(page, drag.move_by_offset(15, 6).move_by_offset(15, 6).release().perform)
+    assert script("return document.getElementById('subject').value") == "person"
+    assert float(script("return document.getElementById('thingX').value")) > 0.05
+    moved = script(shown)
+    assert moved != before
+    scored_again(page, lambda: script("document.getElementById('addPiece').click()"))
+    assert script("return document.getElementById('subject').value") == "chair_1"
+    x = float(script("return document.getElementById('thingX').value"))
+    scored_again(page, lambda: key(page, "\ue014"))
+    assert float(script("return document.getElementById('thingX').value")) > x
+    head = "[data-name=head_tilt_deg]"
+    slide = f"const one = document.querySelector('{head}'); one.value = 5;"
+    scored_again(page, lambda: script(f"{slide} one.oninput(); one.onchange()"))
+    # The address restores the changes in another page.
+    page.driver.refresh()
+    page.wait(lambda: script("return document.querySelectorAll('.thing').length") == 3)
+    page.wait(lambda: script("return document.body.dataset.rescored"))
+    script("document.getElementById('undo').click()")
+    page.wait(lambda: script(shown) == before)
+
+
+def test_the_3d_view_follows_and_motions_are_played(page):
+    script = page.driver.execute_script
+    picture = (
+        "const one = document.getElementById('canvas3d');"
+        "one.dispatchEvent(new KeyboardEvent('keydown', {key: '+'}));"
+        "return document.getElementById('marks3d').toDataURL()"
+    )
+    page.wait(lambda: script("return document.getElementById('armAt').options.length") > 1)
+    page.wait(lambda: script("return document.getElementById('marks3d').width") > 100)
+    before = script(picture)
+    page.wait(lambda: script(picture) != before)
+    script("document.getElementById('plan').click()")
+    page.wait(
+        lambda: "can be done" in script("return document.getElementById('planWords').textContent")
+    )
+    words = script("return document.getElementById('planWords').textContent")
+    if not words.startswith("0 "):
+        page.wait(lambda: not script("return document.getElementById('player').hidden"))
+        time = "return Number(document.getElementById('time').value)"
+        page.wait(lambda: script(time) > 0)
+        label = "return document.getElementById('play').textContent"
+        if script(label) == "Pause":
+            script("document.getElementById('play').click()")
+        assert script(label) == "Play"
+        paused = script(time)
+        assert script(time) == paused
+
+
 def test_languages_and_sizes(page):
     script = page.driver.execute_script
     assert script("return document.documentElement.scrollWidth") <= script("return innerWidth")

@@ -114,6 +114,7 @@ export class FloorMap {
   // Moves the groups to where their things are.
   placeThings() {
     for (const [name, group] of this.groups ?? []) {
+      if (!this.things.find(name)) continue; // removed, and not yet redrawn
       const { x, y, turn } = this.things.pose(name);
       const [cx, cy] = this.things.find(name).centre ?? [0, 0];
       group.setAttribute("transform", `translate(${x} ${-y}) rotate(${-turn} ${cx} ${-cy})`);

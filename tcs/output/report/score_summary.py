@@ -13,6 +13,7 @@ from tcs.output.words import (
     percentage,
     person_text,
     settings_text,
+    stop_places,
 )
 from tcs.placement.constraints import constraint_texts
 from tcs.placement.store import state_to_json
@@ -37,6 +38,7 @@ def summary_blocks(report: ScoreReport) -> list[Block]:
         f"From {stops} the robot reaches {reached} of {goals} goals (P_R "
         f"{percentage(reachability)}); P_M is {manipulability:.3f} ({report.measure})."
     ]
+    items += stop_places(report.file, report.shown.table, report.shown.indices)
     if report.unreached:
         items.append(
             f"Not reached: {goals_text(report.unreached, report.goal_names)}. The section Goals "

@@ -82,9 +82,19 @@ def progress_bar(text: str, *, lines: bool = False) -> Iterator[Callable[[int, i
     if not sys.stderr.isatty():
         yield _lines(text) if lines else _no_bar
         return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
-    columns = (TextColumn(text), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    columns = (
+        *(TextColumn(text), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()),
+        *(TextColumn("left"), TimeRemainingColumn()),
+    )
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         bar = progress.add_task("", total=None)
 
@@ -97,14 +107,15 @@ def progress_bar(text: str, *, lines: bool = False) -> Iterator[Callable[[int, i
 
 def _lines(text: str) -> Callable[[int, int], None]:
     """Return a function that prints progress at most once in LINE_SECONDS."""
-    printed = time.monotonic()
+    begun = printed = time.monotonic()
 
     def advance(done: int, total: int) -> None:
         nonlocal printed
         raise_if_interrupted()
-        if time.monotonic() - printed >= LINE_SECONDS:
-            printed = time.monotonic()
-            note(f"{done} of {total} {text}")
+        if (now := time.monotonic()) - printed >= LINE_SECONDS:
+            printed = now
+            left = f", about {(total - done) * (now - begun) / done:.0f} s left" if done else ""
+            note(f"{done} of {total} {text}{left}")
 
     return advance
 

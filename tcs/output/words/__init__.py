@@ -26,7 +26,12 @@ from tcs.output.words.goals import goal_list, goal_place, goal_text, goals_by_re
 from tcs.output.words.measures import REACHABILITY_LABEL, manipulability_label, scores_text
 from tcs.output.words.numbers import p_value, percent, percentage, signed
 from tcs.output.words.people import person_text
-from tcs.output.words.places import RelativePlace, relative_place
+from tcs.output.words.places import (
+    RelativePlace,
+    frames_of_state,
+    relative_place,
+    stop_places,
+)
 from tcs.output.words.reasons import (
     REASON_COLOURS,
     REASON_NAMES,
@@ -54,6 +59,7 @@ __all__ = [
     "colour_legend",
     "deviation_text",
     "frame_name",
+    "frames_of_state",
     "goal_list",
     "goal_place",
     "goal_text",
@@ -73,4 +79,5 @@ __all__ = [
     "setting_text",
     "settings_text",
     "signed",
+    "stop_places",
 ]

@@ -5,6 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from tcs.placement.store import ScoreFile
 
 _LANDMARKS = {
     "head": "head",
@@ -60,6 +66,40 @@ class RelativePlace:
         """
         beside = [f"beside the {self.beside}"] if self.beside else []
         return f"{', '.join([_SIDES[self.side], *beside, _FACINGS[self.facing]])}."
+
+
+def frames_of_state(file: ScoreFile, table: int, state: int) -> dict[str, list[float]]:
+    """Return the positions of the body frames in a state of the environment [m].
+
+    Args:
+        file: A score file.
+        table: Number of its table.
+        state: Number of the state, in C order over the axes of the environment.
+    """
+    count = len(file.tables)
+    return {
+        name: np.reshape(at, (count, -1, 3))[table, state].tolist()
+        for name, at in file.body_frames.items()
+    }
+
+
+def stop_places(file: ScoreFile, table: int, indices: Sequence[int]) -> list[str]:
+    """Return for each stop of a set where it is relative to the person; none without a person.
+
+    Args:
+        file: A score file.
+        table: Number of the table.
+        indices: Flat indices of the configurations.
+    """
+    texts = []
+    for number, index in enumerate(indices, start=1):
+        member = file.configurations.configuration(index)
+        state = int(file.configurations.state_of(np.array([index]))[0])
+        frames = frames_of_state(file, table, state)
+        place = relative_place(member.base_x, member.base_y, member.base_yaw, frames)
+        if place is not None:
+            texts.append(f"Stop {number}: {place.text[0].lower()}{place.text[1:]}")
+    return texts
 
 
 def relative_place(
