@@ -27,8 +27,9 @@ COLUMNS = (
 MEGABYTE = 1024**2
 LIMIT_MEMORY = (500, 700, 900, 1200, 1600)
 """Address space of a process [MB]: from less than the imports take to enough."""
-LIMIT_FILE = (1, 4, 10_000, 30_000)
-"""Largest file that can be written [bytes]: a disk that is full after so many."""
+LIMIT_FILE = (4_000, 10_000, 30_000)
+"""Largest file that can be written [bytes]: a disk that is full after so many. The semaphores of
+joblib, which are files too, need some dozens."""
 FAULTS = COLUMNS[3:]
 
 

@@ -1,6 +1,7 @@
 import dataclasses
 import os
 import re
+import resource
 import subprocess
 import sys
 import threading
@@ -430,3 +431,21 @@ def test_scoring_with_approach(tcs_command, corner, corner_file, tmp_path):
     assert "approach" in tcs_command("explain", path, "--goal", g, "--configuration", h).out
     assert tcs_command(*words, "--no-approach").json["approach"] is None
     np.testing.assert_array_equal(tcs.load(path).nominal.scores.reason, before.reason)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("blocks", [(), ("--blocks", "blocks")], ids=["file", "blocks"])
+def test_a_full_disk_is_told_in_one_line_and_leaves_nothing(corner, tmp_path, blocks):
+    words = ("score", "shaving", "--environment", str(corner), "--out", "out.tcs", *blocks)
+    ended = subprocess.run(
+        [sys.executable, "-m", "tcs", *words],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (500, 500)),
+    )
+    assert (ended.returncode, ended.stderr.count("\n")) == (1, 1), ended.stderr
+    assert "cannot be written: File too large" in ended.stderr
+    left = [path for path in tmp_path.rglob("*") if path.is_file() and path.name != "lock"]
+    assert left == [path for path in left if path.name == "goals.json"]
