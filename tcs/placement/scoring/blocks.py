@@ -164,24 +164,31 @@ def _locked(path: Path) -> Iterator[None]:
     Raises:
         OutputError: If another process has locked it, or it cannot be written.
     """
-    try:
-        stream = path.open("a+")
-    except OSError as error:
-        raise OutputError(
+
+    def unwritable(error: OSError) -> OutputError:
+        return OutputError(
             f"Folder of blocks '{path.parent}' cannot be written: {error.strerror}. "
             "Name another folder."
-        ) from error
+        )
+
+    try:
+        # Without a buffer, which a full disk would keep from being closed.
+        stream = path.open("a+b", buffering=0)
+    except OSError as error:
+        raise unwritable(error) from error
     with stream:
         try:
             fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             stream.seek(0)
-            process = stream.read(20).strip() or "unknown"
+            process = stream.read(20).decode(errors="replace").strip() or "unknown"
             raise OutputError(
                 f"Folder of blocks '{path.parent}' is in use by process {process}, which scores "
                 "the same. Wait for it, or name another folder."
             ) from None
-        stream.truncate(0)
-        stream.write(str(os.getpid()))
-        stream.flush()
+        try:
+            stream.truncate(0)
+            stream.write(str(os.getpid()).encode())
+        except OSError as error:
+            raise unwritable(error) from error
         yield

@@ -172,6 +172,15 @@ def test_a_second_run_on_the_same_blocks_is_refused_with_the_process(run, tmp_pa
     assert run()[1] == 0
 
 
+def test_a_lock_that_cannot_be_written_is_refused(run, tmp_path):
+    run()
+    (folder,) = (tmp_path / "blocks").iterdir()
+    (folder / "lock").unlink()
+    (folder / "lock").symlink_to("/dev/full")
+    with pytest.raises(OutputError, match="cannot be written"):
+        run()
+
+
 def test_a_folder_that_cannot_be_made_is_refused(run, tmp_path):
     (tmp_path / "blocks").write_text("a file")
     with pytest.raises(OutputError, match="cannot be created"):
