@@ -276,6 +276,19 @@ def test_pandas_wrist_keeps_its_range_because_the_hand_is_checked_against_the_fo
     assert not touching[-5:].any()
 
 
+@pytest.mark.parametrize(
+    ("pair", "beyond"), [(("laser", "link_lift"), 0.03), (("link_head", "link_lift"), 1.09)]
+)
+def test_the_lift_of_stretch_crosses_base_and_head_only_beyond_its_range(pair, beyond):
+    robot = load_robot("stretch")
+    assert pair in robot.disabled_pairs
+    lift = robot.joint_limits()["joint_lift"]
+    assert lift != robot.without_ranges.joint_limits()["joint_lift"]
+    *within, out = mesh_distances(robot, pair, [{"joint_lift": q} for q in (*lift, beyond)])
+    assert min(within) > robot.self_margin
+    assert out <= 0.0
+
+
 @pytest.mark.parametrize(("name", "side"), [("pr2", "l"), ("pr2_right", "r")])
 def test_shoulder_and_upper_arm_cross_only_beyond_the_range_of_the_lift(name, side):
     robot = load_robot(name)
