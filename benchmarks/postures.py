@@ -28,6 +28,7 @@ ROWS = (
     ("feeding", "wheelchair", HEAD),
     ("brushing", "wheelchair", HEAD),
     ("shaving", "bed", HEAD),
+    ("shaving", "bed-no-wall", HEAD),
     ("bathing", "bed", ARMS),
 )
 """Tasks on the face, and the one other task that no single configuration does."""

@@ -213,6 +213,7 @@ def _environment_shapes(scene: Scene) -> list[BodyShape]:
             inspector.GetShape(part.geometry),
             inspector.GetPoseInFrame(part.geometry),
             rgba(category.colour),
+            is_rounded=category is Category.PERSON,
         )
         for part, category in environment_parts(scene)
     ]

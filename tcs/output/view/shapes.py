@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from pydrake.geometry import Box, Mesh, Meshcat, Rgba, Role, Shape
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import BodyIndex
+from scipy.spatial import ConvexHull
 
 from tcs.model.robots.urdf.meshes import mesh_triangles
 from tcs.model.scene import Scene
@@ -21,6 +23,11 @@ from tcs.output.draw import Category
 FloatArray = NDArray[np.float64]
 _GREY = Rgba(0.75, 0.77, 0.8, 1.0)
 """Colour of meshes without a colour in the URDF."""
+
+_ROUNDED = 0.7
+"""Radius of the edges of a rounded box, as a fraction of its least half size."""
+_DIRECTIONS = 12
+"""Directions around an edge of a rounded box."""
 
 _LIGHTS = {
     "SpotLight": 0.0,
@@ -41,6 +48,8 @@ class BodyShape:
     X_LS: RigidTransform
     """Its pose in the body's frame L."""
     colour: Rgba
+    is_rounded: bool = False
+    """Whether a box is drawn with round edges, as parts of a person are."""
 
 
 def robot_shapes(scene: Scene, meshes: bool) -> list[BodyShape]:
@@ -86,9 +95,38 @@ def draw_shapes(
         if compact and isinstance(one.shape, Mesh):
             corners, faces = _triangles(one.shape)
             meshcat.SetTriangleMesh(path, corners, faces, one.colour)
+        elif one.is_rounded and isinstance(one.shape, Box):
+            meshcat.SetTriangleMesh(path, *rounded_box(one.shape.size()), one.colour)
         else:
             meshcat.SetObject(path, one.shape, one.colour)
         meshcat.SetTransform(path, one.X_LS)
+
+
+def rounded_box(size: FloatArray) -> tuple[FloatArray, NDArray[np.int32]]:
+    """Return corners [m], shape (3, n), and triangles, shape (3, m), of a box with round edges.
+
+    It is within the box, and touches the middles of its faces.
+
+    Args:
+        size: Lengths of the edges [m], shape (3,).
+    """
+    half = 0.5 * np.asarray(size, dtype=np.float64)
+    radius = _ROUNDED * float(half.min())
+    angles = np.linspace(0.0, 0.5 * np.pi, _DIRECTIONS // 4 + 1)
+    up, around = (grid.ravel() for grid in np.meshgrid(angles, angles))
+    octant = np.stack(
+        [np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)], axis=1
+    )
+    signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+    corners = np.concatenate([sign * (half - radius + radius * octant) for sign in signs])
+    corners = np.unique(np.round(corners, 9), axis=0)
+    hull = ConvexHull(corners)
+    faces = hull.simplices.copy()
+    # Triangles of the hull have no order; their normals point outward.
+    a, b, c = (corners[faces[:, i]] for i in range(3))
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0.0
+    faces[inward] = faces[inward][:, ::-1]
+    return np.ascontiguousarray(corners.T), np.ascontiguousarray(faces.T.astype(np.int32))
 
 
 def draw_ground(meshcat: Meshcat) -> None:
