@@ -38,8 +38,11 @@ class Commands(TyperGroup):
 
 def is_for_want_of_memory(error: BaseException) -> bool:
     """Return whether an exception says that memory, or the space of addresses, is used up."""
-    return isinstance(error, MemoryError) or (
-        isinstance(error, RuntimeError) and str(error) == "can't start new thread"
+    return (
+        isinstance(error, MemoryError)
+        or (isinstance(error, RuntimeError) and str(error) == "can't start new thread")
+        # Compiled modules that find no memory while they are imported.
+        or (isinstance(error, SystemError) and str(error) == "error return without exception set")
     )
 
 
