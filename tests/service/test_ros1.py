@@ -12,7 +12,7 @@ import pytest
 from tcs.errors import ServiceError
 from tcs.placement.store import save_scores
 from tcs.service import Engine, SelectRequest
-from tcs.service.ros import FrameNames, Placer, Stop, Trajectory
+from tcs.service.ros import FrameNames, PlacedStop, Placer, Trajectory
 from tcs.service.ros.ros1 import Ros1Node
 from tcs.service.ros.ros1_types import ros1_modules, ros1_types
 from tests.placement.store.example import score_file
@@ -108,7 +108,7 @@ def test_errors_have_their_line(ros):
 def test_trajectories_are_sent(ros, monkeypatch):
     """A plan arrives as trajectories of the joints, with times from the start of each."""
     motion = Trajectory(("a", "b"), [0.0, 0.5], [[0.0, 1.0], [0.25, 1.5]], [[0.0, 0.0], [0.5, 0.1]])
-    stop = Stop(1.0, 2.0, 0.0, 0.3, {}, goals=(4, 2), trajectories=(motion, motion))
+    stop = PlacedStop(1.0, 2.0, 0.0, 0.3, {}, goals=(4, 2), trajectories=(motion, motion))
     choice = {"members": [], "reachability": 1, "manipulability": 0.5, "net_utility": 1.4}
     placement = SimpleNamespace(file="f", stops=(stop,), choice=choice)
     monkeypatch.setattr(Placer, "place", lambda _self, _request: placement)

@@ -9,15 +9,15 @@ system, and ROS 2 need not be installed.
 from __future__ import annotations
 
 from tcs.service.ros.frames import FrameNames, Pose, TransformTree
-from tcs.service.ros.placing import Placement, Placer, PlaceRequest, Stop, Trajectory
+from tcs.service.ros.placing import PlacedRobot, PlacedStop, Placer, PlaceRequest, Trajectory
 
 __all__ = [
     "FrameNames",
     "PlaceRequest",
-    "Placement",
+    "PlacedRobot",
+    "PlacedStop",
     "Placer",
     "Pose",
-    "Stop",
     "Trajectory",
     "TransformTree",
 ]

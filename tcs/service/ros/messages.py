@@ -10,7 +10,7 @@ import numpy as np
 
 from tcs.errors import DataFileError
 from tcs.service.ros.frames import Pose
-from tcs.service.ros.placing import Placement, PlaceRequest, Stop, Trajectory
+from tcs.service.ros.placing import PlacedRobot, PlacedStop, PlaceRequest, Trajectory
 
 
 def pose_of(transform: Any) -> Pose:
@@ -50,7 +50,7 @@ def place_request(message: Any) -> PlaceRequest:
     )
 
 
-def placed_fields(placement: Placement, factory: Any) -> dict[str, Any]:
+def placed_fields(placement: PlacedRobot, factory: Any) -> dict[str, Any]:
     """Return the fields of a message `PlaceRobot_Response`.
 
     Args:
@@ -73,7 +73,7 @@ def placed_fields(placement: Placement, factory: Any) -> dict[str, Any]:
     }
 
 
-def _configuration(stop: Stop, factory: Any) -> Any:
+def _configuration(stop: PlacedStop, factory: Any) -> Any:
     return factory.configuration(
         base_pose=factory.pose(stop),
         torso_height=stop.torso,

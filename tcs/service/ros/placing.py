@@ -46,7 +46,7 @@ class Trajectory:
 
 
 @dataclass(frozen=True, slots=True)
-class Stop:
+class PlacedStop:
     """Where the robot stands, and how torso and environment are set."""
 
     x: float
@@ -61,11 +61,11 @@ class Stop:
 
 
 @dataclass(frozen=True, slots=True)
-class Placement:
+class PlacedRobot:
     """The answer to a semantic request."""
 
     file: str
-    stops: tuple[Stop, ...]
+    stops: tuple[PlacedStop, ...]
     """In the order of the tour, in the frame of the environment."""
     choice: dict[str, Any]
     """The answer of `select`."""
@@ -84,7 +84,7 @@ class Placer:
         """
         self._engine, self._tree, self.names = engine, tree, names
 
-    def place(self, request: PlaceRequest) -> Placement:
+    def place(self, request: PlaceRequest) -> PlacedRobot:
         """Return the initial configurations with the greatest utility from where the robot is.
 
         Raises:
@@ -108,7 +108,7 @@ class Placer:
         stops = tuple(_stop(member) for member in choice["members"])
         if request.plan:
             stops = self._planned(digest, choice, {**state, "frames": frames}, stops)
-        return Placement(digest, stops, choice)
+        return PlacedRobot(digest, stops, choice)
 
     def _entry(self, request: PlaceRequest) -> FileEntry:
         """Return the newest score file of a request."""
@@ -152,8 +152,12 @@ class Placer:
         return str(done["file"])
 
     def _planned(
-        self, digest: str, choice: Mapping[str, Any], state: dict[str, Any], stops: tuple[Stop, ...]
-    ) -> tuple[Stop, ...]:
+        self,
+        digest: str,
+        choice: Mapping[str, Any],
+        state: dict[str, Any],
+        stops: tuple[PlacedStop, ...],
+    ) -> tuple[PlacedStop, ...]:
         """Return the stops with the motions that do the task from there."""
         if "refined" in choice:
             raise ServiceError(
@@ -221,23 +225,25 @@ def parsed_object(text: str, what: str) -> dict[str, Any]:
     return fields
 
 
-def _stop(member: Mapping[str, Any]) -> Stop:
+def _stop(member: Mapping[str, Any]) -> PlacedStop:
     settings = {
         name.removesuffix("_deg"): math.radians(value) if name.endswith("_deg") else float(value)
         for name, value in member.items()
         if name not in _BASE
     }
     x, y, yaw_deg, torso = (float(member[name]) for name in _BASE[:4])
-    return Stop(x, y, math.radians(yaw_deg), torso, settings)
+    return PlacedStop(x, y, math.radians(yaw_deg), torso, settings)
 
 
-def _with_motions(stop: Stop, planned: Mapping[str, Any] | None, joints: tuple[str, ...]) -> Stop:
+def _with_motions(
+    stop: PlacedStop, planned: Mapping[str, Any] | None, joints: tuple[str, ...]
+) -> PlacedStop:
     if planned is None:
         return stop
     trajectories = tuple(
         Trajectory(joints, segment["times"], segment["positions"], segment["velocities"])
         for segment in planned["segments"]
     )
-    return Stop(
+    return PlacedStop(
         stop.x, stop.y, stop.yaw, stop.torso, stop.settings, tuple(planned["goals"]), trajectories
     )

@@ -18,7 +18,7 @@ from tcs.service.engine import Engine
 from tcs.service.named_requests import NamedRequests, named_problem
 from tcs.service.ros.frames import FrameNames, TransformTree
 from tcs.service.ros.messages import place_request, placed_fields, pose_of
-from tcs.service.ros.placing import Placer, Stop, parsed_object
+from tcs.service.ros.placing import PlacedStop, Placer, parsed_object
 from tcs.service.ros.ros1_types import ros1_modules, ros1_types
 
 _MASTER_SECONDS = 5.0
@@ -120,7 +120,7 @@ class Ros1Node:
         """Return what makes the messages of an answer."""
         now, frame = self._ros.rospy.get_rostime(), self._placer.names.environment
 
-        def pose(stop: Stop) -> Any:
+        def pose(stop: PlacedStop) -> Any:
             made = self._ros.geometry_msgs.PoseStamped()
             made.header.stamp, made.header.frame_id = now, frame
             made.pose.position.x, made.pose.position.y = stop.x, stop.y

@@ -19,7 +19,7 @@ from tcs.service.engine import Engine
 from tcs.service.named_requests import NamedRequests, named_problem
 from tcs.service.ros.frames import FrameNames, TransformTree
 from tcs.service.ros.messages import place_request, placed_fields, pose_of
-from tcs.service.ros.placing import Placer, Stop, parsed_object
+from tcs.service.ros.placing import PlacedStop, Placer, parsed_object
 from tcs.service.ros.ros2_actions import JobActions
 from tcs.service.ros.ros2_entities import Ros2Session
 from tcs.service.ros.ros2_types import Ros2Types
@@ -130,7 +130,7 @@ class Ros2Node:
             frame_id=self._placer.names.environment,
         )  # fmt: skip
 
-        def pose(stop: Stop) -> Any:
+        def pose(stop: PlacedStop) -> Any:
             half = stop.yaw / 2.0
             position = make("geometry_msgs/msg/Point", x=stop.x, y=stop.y)
             turned = make("geometry_msgs/msg/Quaternion", z=math.sin(half), w=math.cos(half))
