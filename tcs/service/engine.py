@@ -28,7 +28,7 @@ from tcs.service.floor import floor_of, outcome_of
 from tcs.service.heavy_imports import import_heavy
 from tcs.service.jobs import Jobs, Progress
 from tcs.service.limits import Limits
-from tcs.service.postures import Postures
+from tcs.service.postures import ScenePostures
 from tcs.service.requests import (
     EvaluateRequest,
     ExplainRequest,
@@ -78,7 +78,7 @@ class Engine:
         self._sent = SentDocuments(folder)
         self._jobs = Jobs(limits)
         self._views = Views(self._files)
-        self._postures = Postures()
+        self._postures = ScenePostures()
         self._work = SceneWork(self._files, self._sent, limits)
         self._set_work = SetWork(self._files, limits)
 
@@ -259,7 +259,7 @@ class Engine:
             return outcome_of(file, table_of(file, request), stated, best=request.best)
 
     def posture(self, request: PostureRequest) -> dict[str, Any]:
-        """Return the scene in space at a base pose, as `tcs.service.postures.Postures.at`.
+        """Return the scene in space at a base pose, as `tcs.service.postures.ScenePostures.at`.
 
         Raises:
             NotFoundError: If the score file is not held.

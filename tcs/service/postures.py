@@ -26,7 +26,7 @@ _SHAPES = ("sphere", "capsule", "box")
 """Names of the kernel's shapes, by their numbers."""
 
 
-class Postures:
+class ScenePostures:
     """Scenes of score files, kept while they are looked at."""
 
     def __init__(self) -> None:
@@ -51,7 +51,7 @@ class Postures:
             stated: The configuration; the nearest one of the grid is shown.
             goal: The goal that the arm is at; by default the one of greatest dexterity. The arm is
                 at rest where it does not reach it.
-            arm: Postures of the arm [rad or m], instead of that at the goal: a frame for each.
+            arm: ScenePostures of the arm [rad or m], instead of that at the goal: a frame for each.
 
         Returns:
             `shapes`: each with its body, category, contact name, type, size [m] and pose in the
