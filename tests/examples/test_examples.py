@@ -32,9 +32,16 @@ WRITTEN = {
     "08_capability_map": ["tiago.tcm"],
     "10_viewer_page": ["feeding.html"],
 }
+SLOW = ("02", "04", "06", "12")
+"""Examples that score several times; `make wheel` runs them too."""
 
 
-@pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.stem)
+def marked(path):
+    slow = [pytest.mark.slow] if path.stem.startswith(SLOW) else []
+    return pytest.param(path, id=path.stem, marks=slow)
+
+
+@pytest.mark.parametrize("path", [marked(path) for path in SCRIPTS])
 def test_example_runs(path, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     runpy.run_path(str(path), run_name="__main__")

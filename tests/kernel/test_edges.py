@@ -33,7 +33,7 @@ def some_of(values, *fast):
     return [v if v in fast else pytest.param(v, marks=pytest.mark.slow) for v in values]
 
 
-AWAY = some_of([0.1, 0.06, 0.01, 0.003, 1e-3], 0.1, 1e-3)
+AWAY = some_of([0.1, 0.06, 0.01, 0.003, 1e-3], 1e-3)
 
 
 @pytest.fixture(scope="module", params=ROBOTS)

@@ -110,6 +110,7 @@ def test_a_path_that_takes_no_folder_is_reported(study, pictures, plan, tmp_path
         write_report(tmp_path / "file" / "x", [study], [pictures], plan, seconds=1.0, command="it")
 
 
+@pytest.mark.slow
 def test_pictures_do_not_depend_on_the_number_of_processes(pictures, score_path):
     assert draw_rows([score_path], jobs=2) == (pictures,)
     assert pictures.map.startswith(b"\x89PNG")

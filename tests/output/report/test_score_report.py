@@ -143,6 +143,7 @@ def test_goals_that_one_base_pose_misses_have_a_reason_and_a_change(single):
     assert [row for row in goals_table(single).texts() if row[2] == "nowhere"]
 
 
+@pytest.mark.slow
 def test_the_set_is_the_one_selected_from_here(score_path):
     here = InitialConfiguration(base_x=0.6, base_y=0.7, base_yaw=0.0, torso=0.0)
     found = make_score_report(score_path, here=here, sizes=CheckSizes(pairs=0, dense=0))
@@ -166,6 +167,7 @@ def false_path(score_path, tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 def test_a_false_answer_is_reported(false_path):
     found = make_score_report(false_path, sizes=CHECK)
     assert not found.is_sound
@@ -176,6 +178,7 @@ def test_a_false_answer_is_reported(false_path):
     assert "every answer holds" not in wording
 
 
+@pytest.mark.slow
 def test_a_false_posture_that_only_the_report_shows_is_found(score_path, tmp_path):
     file = load_scores(score_path)
     scores = file.nominal.scores

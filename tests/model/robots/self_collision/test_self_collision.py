@@ -98,13 +98,13 @@ def test_samples_stay_within_limits_and_mimic(pr2):
         assert sample["l_gripper_r_finger_joint"] == sample["l_gripper_l_finger_joint"]
 
 
-# Measured over 2000 postures: 0.85, 0.89, 0.94; four standard errors of 400 are 0.07.
+# Measured over 2000 postures: 0.85, 0.89, 0.94; four standard errors of 150 are 0.12.
 @pytest.mark.parametrize(("torso", "share"), [(0.0115, 0.85), (0.15, 0.89), (0.3, 0.94)])
 def test_most_arm_postures_are_free(pr2, judge, arm_bodies, torso, share):
     free = [
-        not checked(pr2, judge.touching(q), arm_bodies) for q in postures(pr2, torso, 400, seed=3)
+        not checked(pr2, judge.touching(q), arm_bodies) for q in postures(pr2, torso, 150, seed=3)
     ]
-    assert np.mean(free) == pytest.approx(share, abs=0.07)
+    assert np.mean(free) == pytest.approx(share, abs=0.12)
 
 
 def test_primitives_rarely_touch_where_hulls_do_not(pr2, judge, arm_bodies):
@@ -112,7 +112,7 @@ def test_primitives_rarely_touch_where_hulls_do_not(pr2, judge, arm_bodies):
     false = [
         bool(checked(pr2, judge.touching(q), arm_bodies))
         and not checked(pr2, hulls.touching(q), arm_bodies)
-        for q in postures(pr2, 0.15, 400, seed=3)
+        for q in postures(pr2, 0.15, 200, seed=3)
     ]
     # Measured 0.005 over 2000 postures.
     assert np.mean(false) <= 0.02
