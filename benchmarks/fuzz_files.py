@@ -245,7 +245,7 @@ def _read_environment(path: Path) -> Any:
 
 
 def _read_model(path: Path) -> Any:
-    from tcs.model.scene.model_files import check_model_file
+    from tcs.model.scene.environment.model_files import check_model_file
 
     return check_model_file(path, f"model '{path}'")
 

@@ -189,7 +189,7 @@ def _read_constraints(path: Path) -> Any:
 
 
 def _read_cloud(path: Path) -> Any:
-    from tcs.model.scene.obstacle_files import cloud_points
+    from tcs.model.scene.environment.obstacle_files import cloud_points
 
     return cloud_points(path, 1.0, "obstacle 'cloud'")
 

@@ -17,7 +17,7 @@ from table import cell, header, parser, record_table, row, save
 
 from tcs.model.robots import load_robot
 from tcs.output.report.blocks import Table
-from tcs.output.report.teleop_tables import maps_blocks, median_of
+from tcs.output.report.teleop.tables import maps_blocks, median_of
 from tcs.teleop.arm import load_arm, torso_height_of
 from tcs.teleop.experiment.course import find_course
 from tcs.teleop.experiment.maps import controller_maps

@@ -16,7 +16,7 @@ from table import CHECKOUT, header, parser, record, row, save
 
 from tcs.model.people import Person, Scale, draw_bodies, link_scales, scales_of_people
 from tcs.model.scene import load_environment
-from tcs.model.scene.resized_person import (
+from tcs.model.scene.person.resized import (
     covers_of,
     padding_of,
     part_of,

@@ -26,7 +26,7 @@ from tcs.capability import (
 )
 from tcs.capability.head import head_view
 from tcs.errors import TaskError
-from tcs.output.report.pick_and_place_tables import (
+from tcs.output.report.pick_and_place.tables import (
     segments_table,
     table_2,
 )

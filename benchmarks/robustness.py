@@ -22,8 +22,8 @@ import tcs
 from tcs.files.writing import make_folder
 from tcs.output.report import load_paper
 from tcs.output.report.blocks import Table
-from tcs.output.report.paper import Paper
-from tcs.output.report.tables import (
+from tcs.output.report.robustness.paper import Paper
+from tcs.output.report.robustness.tables import (
     find_contrast,
     gain_table,
     is_short,

@@ -17,8 +17,8 @@ from typing import Any
 import tcs
 from tcs.output import terminal
 from tcs.output.draw import save_figure
-from tcs.output.report.pictures import map_figure, scene_figure
-from tcs.output.report.shown_set import ShownSet
+from tcs.output.report.score.pictures import map_figure, scene_figure
+from tcs.output.report.score.shown_set import ShownSet
 from tcs.output.words import member_text, percentage, scores_text
 from tcs.placement.scoring import load_job
 

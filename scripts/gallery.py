@@ -21,9 +21,9 @@ import tcs
 from tcs.files.writing import make_folder, whole_file
 from tcs.output import terminal
 from tcs.output.draw import as_png
-from tcs.output.report.pictures import map_figure, member_figure, scene_figure
-from tcs.output.report.shown_set import ShownSet
-from tcs.output.report.states import states_figure
+from tcs.output.report.score.pictures import map_figure, member_figure, scene_figure
+from tcs.output.report.score.shown_set import ShownSet
+from tcs.output.report.score.states import states_figure
 from tcs.output.words import member_text
 from tcs.placement.robustness import check_row
 from tcs.placement.scoring import default_path, task_environment_pairs

@@ -27,7 +27,7 @@ def check(
 ) -> None:
     """Check an environment without a robot: what touches what, what is outside the grid."""
     from tcs.model.scene import load_environment
-    from tcs.model.scene.environment_check import check_environment
+    from tcs.model.scene.environment.check import check_environment
 
     found = check_environment(load_environment(environment))
     terminal.print_result(found.to_json(), environment_tables.report_check, as_json=as_json)

@@ -87,7 +87,7 @@ def plan(
     from tcs.motion import save_plan
     from tcs.motion.files import check_plan_path
     from tcs.motion.plans import exact_state
-    from tcs.output.report.shown_set import ShownSet
+    from tcs.output.report.score.shown_set import ShownSet
     from tcs.output.terminal.motion_tables import report_plan
     from tcs.placement.selection import nearest_table
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     # Quick commands such as `tcs list` must not load matplotlib.
     from matplotlib.figure import Figure
 
-    from tcs.output.report.shown_set import ShownSet
+    from tcs.output.report.score.shown_set import ShownSet
     from tcs.placement.store import ScoreFile
 
 SCORES = ("reachability", "manipulability")
@@ -59,13 +59,13 @@ def draw_map(
 
     def figure(loaded: ScoreFile, shown: ShownSet) -> Figure:
         if states:
-            from tcs.output.report.states import states_figure
+            from tcs.output.report.score.states import states_figure
 
             by_manipulability = score == "manipulability"
             return states_figure(
                 loaded, shown, "manipulability" if by_manipulability else "reachability"
             )
-        from tcs.output.report.pictures import map_figure
+        from tcs.output.report.score.pictures import map_figure
 
         return map_figure(loaded, shown)
 
@@ -85,7 +85,7 @@ def draw_picture(
     """
 
     def figure(loaded: ScoreFile, shown: ShownSet) -> Figure:
-        from tcs.output.report.pictures import scene_figure
+        from tcs.output.report.score.pictures import scene_figure
 
         return scene_figure(loaded, shown)
 
@@ -110,7 +110,7 @@ def _draw(
     check_writable(out)
     loaded = tcs.load(file)
 
-    from tcs.output.report.shown_set import ShownSet
+    from tcs.output.report.score.shown_set import ShownSet
 
     observed = chosen.observation(loaded.observed_axes)
     shown = ShownSet.of(loaded, here, chosen.max_members, observed, refined=chosen.refined)

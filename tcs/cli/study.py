@@ -160,7 +160,7 @@ def report(
     as_json: options.Json = False,
 ) -> None:
     """Compare the conditions: the papers' tables and pictures, with every table as CSV."""
-    from tcs.output.report.study_files import write_study_report
+    from tcs.output.report.study.files import write_study_report
     from tcs.output.terminal import study_tables
     from tcs.teleop.study.study_file import load_study
 

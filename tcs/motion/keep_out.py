@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from tcs.kernel.arrays import BOX, FloatArray
 from tcs.model.scene import LoweredScene, Scene, SceneSpec
 from tcs.model.scene.contacts import Group
-from tcs.model.scene.environment import Obstacle
+from tcs.model.scene.environment.environment_file import Obstacle
 from tcs.model.tasks import KeepOut, Task
 from tcs.placement.scoring.job import Job
 

@@ -64,7 +64,7 @@ def simulate(
     The same seed and run have the same errors, whatever is scanned.
 
     Args:
-        shapes: Shapes in W, e.g. of `tcs.model.scene.environment_shapes`.
+        shapes: Shapes in W, e.g. of `tcs.model.scene.environment.shapes`.
         base: X_WB, the pose of the base.
         scanner: The scanner.
         scans: Number of scans.

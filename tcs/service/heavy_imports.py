@@ -9,7 +9,11 @@ import threading
 from importlib import import_module
 
 _LOCK = threading.Lock()
-_MODULES = ("tcs.placement.scoring", "tcs.output.report.pictures", "tcs.output.view.scene_objects")
+_MODULES = (
+    "tcs.placement.scoring",
+    "tcs.output.report.score.pictures",
+    "tcs.output.view.scene_objects",
+)
 
 
 def import_heavy() -> None:

@@ -16,7 +16,7 @@ from tcs.placement.store import ScoreFile, file_of_arm
 from tcs.placement.tables import Reason
 
 if TYPE_CHECKING:
-    from tcs.output.report.pictures import ScoredScene
+    from tcs.output.report.score.pictures import ScoredScene
 
 _KEPT = 3
 """Most scenes that are kept."""
@@ -119,8 +119,8 @@ class ScenePostures:
 
     def _scene(self, digest: str, file: ScoreFile) -> ScoredScene:
         """Return the scene of a file, built when it is first looked at."""
-        from tcs.output.report.pictures import scored_scene
-        from tcs.output.report.shown_set import ShownSet
+        from tcs.output.report.score.pictures import scored_scene
+        from tcs.output.report.score.shown_set import ShownSet
 
         if digest not in self._scenes:
             shown = ShownSet(None, (), (), file.nominal_index, "", file)
@@ -134,7 +134,7 @@ class ScenePostures:
 def _shapes_of(scene: Any) -> tuple[list[dict[str, Any]], list[Any]]:
     """Return the shapes of a scene but its floor, and the bodies that they are fixed to."""
     from tcs.model.scene.contacts import Group, shape_of
-    from tcs.output.report.scene_solids import environment_parts
+    from tcs.output.report.score.scene_solids import environment_parts
 
     inspector = scene.built.scene_graph.model_inspector()
     parts = [(part, category.name.lower()) for part, category in environment_parts(scene)]

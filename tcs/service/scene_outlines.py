@@ -10,11 +10,11 @@ import numpy as np
 
 from tcs.model.grid import Grid
 from tcs.model.scene import EnvironmentFile, Scene, goal_poses
-from tcs.model.scene.environment import WORLD
+from tcs.model.scene.environment.environment_file import WORLD
 from tcs.model.scene.pieces import PIECES
-from tcs.output.report.pictures import scored_scene
-from tcs.output.report.scene_solids import base_outline, environment_parts, part_solid
-from tcs.output.report.shown_set import ShownSet
+from tcs.output.report.score.pictures import scored_scene
+from tcs.output.report.score.scene_solids import base_outline, environment_parts, part_solid
+from tcs.output.report.score.shown_set import ShownSet
 from tcs.placement.store import ScoreFile
 from tcs.service.jobs import Progress
 

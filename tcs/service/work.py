@@ -198,7 +198,7 @@ class SceneWork:
     ) -> Sequence[int] | InitialConfiguration | RefinedSet:
         """Return the stops of a plan, as `tcs plan` chooses them."""
         from tcs.motion.plans import exact_state
-        from tcs.output.report.shown_set import ShownSet
+        from tcs.output.report.score.shown_set import ShownSet
 
         observed = observed_of(request.observed, file.observed_axes)
         here = None

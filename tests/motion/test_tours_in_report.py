@@ -10,9 +10,10 @@ from typer.testing import CliRunner
 
 import tcs
 from tcs.cli.app import app
-from tcs.output.report import score_report, tours
 from tcs.output.report.blocks import Bullets, Table, Text
-from tcs.output.report.tours import Tours, tours_blocks
+from tcs.output.report.score import report as score_report
+from tcs.output.report.score import tours
+from tcs.output.report.score.tours import Tours, tours_blocks
 from tcs.placement.scoring.rebuild import rebuild_scene
 
 
@@ -21,7 +22,7 @@ def _fewer_postures():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(tours, "_RATE", 3.0)
         patch.setattr("tcs.output.draw.camera.SIZE", (300, 260))
-        patch.setattr("tcs.output.report.score_report._DPI", 30)
+        patch.setattr("tcs.output.report.score.report._DPI", 30)
         yield
 
 

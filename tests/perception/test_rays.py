@@ -10,7 +10,7 @@ from pydrake.systems.framework import DiagramBuilder
 from tcs.errors import EnvironmentFileError
 from tcs.kernel.arrays import BOX, CAPSULE, SPHERE, Shapes
 from tcs.model.scene import environment_shapes, load_environment
-from tcs.model.scene.environment_plant import add_environment
+from tcs.model.scene.environment.plant import add_environment
 from tcs.perception import PlanarPose, load_table
 from tcs.perception.rays import cast
 from tcs.perception.simulation import with_table

@@ -94,7 +94,7 @@ def pick_and_place(
     as_json: options.Json = False,
 ) -> None:
     """Pick and place a cup from three base poses of TIAGo: the experiment of the ITCM thesis."""
-    from tcs.output.report.pick_and_place_files import write_pick_and_place
+    from tcs.output.report.pick_and_place.files import write_pick_and_place
     from tcs.teleop.control.latency import Latency
     from tcs.teleop.pick_and_place.master import Coupling
     from tcs.teleop.pick_and_place.protocol import Plan

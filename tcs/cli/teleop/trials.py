@@ -58,7 +58,7 @@ def experiment(
     """Compare controllers: scripted operators follow a line that requires null-space motion."""
     from tcs.files.writing import check_writable
     from tcs.model.robots import load_robot
-    from tcs.output.report.teleop_files import FILES, make_experiment_folder, write_experiment
+    from tcs.output.report.teleop.files import FILES, make_experiment_folder, write_experiment
     from tcs.teleop.arm import load_arm, torso_height_of
     from tcs.teleop.experiment.within_subject import ExperimentPlan
 

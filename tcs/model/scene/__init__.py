@@ -7,7 +7,7 @@ and its lowering to arrays, from which the kernel computes the same.
 from __future__ import annotations
 
 from tcs.model.scene.body_frames import body_frame_positions
-from tcs.model.scene.environment import (
+from tcs.model.scene.environment.environment_file import (
     EMPTY_ENVIRONMENT,
     EnvironmentFile,
     ModelEntry,
@@ -16,8 +16,8 @@ from tcs.model.scene.environment import (
     load_environment,
     with_person,
 )
-from tcs.model.scene.environment_shapes import environment_shapes
-from tcs.model.scene.error_distribution import ErrorDistribution
+from tcs.model.scene.environment.error_distribution import ErrorDistribution
+from tcs.model.scene.environment.shapes import environment_shapes
 from tcs.model.scene.lowered_scene import LoweredScene
 from tcs.model.scene.lowering import (
     arm_chain,
@@ -28,9 +28,9 @@ from tcs.model.scene.lowering import (
 )
 from tcs.model.scene.neighbours import NeighbourList
 from tcs.model.scene.observation import JointEstimate, Observation, estimate_joints
-from tcs.model.scene.people_in_scene import PeopleInScene
-from tcs.model.scene.person_goals import goals_on_person
-from tcs.model.scene.posture import Posture
+from tcs.model.scene.person.goals import goals_on_person
+from tcs.model.scene.person.people import PeopleInScene
+from tcs.model.scene.person.posture import Posture
 from tcs.model.scene.scene import Contact, Scene
 from tcs.model.scene.spec import SceneSpec
 from tcs.model.scene.surface_goals import with_surface_goals

@@ -15,7 +15,7 @@ from pydrake.math import RollPitchYaw, RotationMatrix
 from tcs.errors import EnvironmentFileError, UnknownNameError
 from tcs.files.paths import data_folder
 from tcs.model.grid import Axis
-from tcs.model.scene.environment import E, EnvironmentFile
+from tcs.model.scene.environment.environment_file import E, EnvironmentFile
 from tcs.model.scene.pieces import PlacedPiece, with_pieces
 
 SUFFIX = " changed"

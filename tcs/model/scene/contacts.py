@@ -22,7 +22,7 @@ from pydrake.multibody.tree import BodyIndex
 
 from tcs.errors import EnvironmentFileError, UnknownNameError
 from tcs.kernel.arrays import BOX, CAPSULE, SPHERE, BoolArray
-from tcs.model.scene.environment import FLOOR
+from tcs.model.scene.environment.environment_file import FLOOR
 
 
 class Group(Enum):

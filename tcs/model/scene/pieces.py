@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from tcs.errors import UnknownNameError
-from tcs.model.scene.environment import EnvironmentFile, Obstacle
+from tcs.model.scene.environment.environment_file import EnvironmentFile, Obstacle
 
 Size = tuple[float, float, float]
 

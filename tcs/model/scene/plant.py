@@ -34,9 +34,9 @@ from tcs.errors import EnvironmentFileError, RobotError
 from tcs.kernel.arrays import FloatArray
 from tcs.model.robots import Primitive, RobotFile, robot_urdf
 from tcs.model.scene.contacts import ContactRule, Group, Part, apply_rule, shape_of
-from tcs.model.scene.environment import FLOOR, WORLD
-from tcs.model.scene.environment_plant import add_environment, environment_parts
-from tcs.model.scene.joints import EnvironmentJoints
+from tcs.model.scene.environment.environment_file import FLOOR, WORLD
+from tcs.model.scene.environment.joints import EnvironmentJoints
+from tcs.model.scene.environment.plant import add_environment, environment_parts
 from tcs.model.scene.spec import SceneSpec
 
 BASE_JOINTS = ("base_x", "base_y", "base_yaw")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tcs.model.robots import RobotFile
-from tcs.model.scene.environment import EnvironmentFile
+from tcs.model.scene.environment.environment_file import EnvironmentFile
 from tcs.model.scene.mounting import bolted
 
 

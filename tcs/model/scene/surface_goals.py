@@ -16,8 +16,8 @@ from tcs.errors import TaskError, UnknownNameError
 from tcs.files.quantities import GOALS
 from tcs.kernel.arrays import BOX, SPHERE, FloatArray, IntArray
 from tcs.model.scene.contacts import shape_of
-from tcs.model.scene.environment import WORLD, EnvironmentFile
-from tcs.model.scene.environment_plant import add_environment, environment_parts
+from tcs.model.scene.environment.environment_file import WORLD, EnvironmentFile
+from tcs.model.scene.environment.plant import add_environment, environment_parts
 from tcs.model.tasks import Goal, Surface, Task
 from tcs.model.tasks.surface import FACING, PARTS
 

@@ -9,13 +9,13 @@ from __future__ import annotations
 from tcs.output.report.blocks import Page, Section
 from tcs.output.report.html import as_html
 from tcs.output.report.markdown import as_markdown
-from tcs.output.report.paper import Paper, load_paper
-from tcs.output.report.robustness import robustness_page
-from tcs.output.report.row_pictures import RowPictures, draw_row, draw_rows
-from tcs.output.report.score_files import report_paths, write_score_report
-from tcs.output.report.score_page import make_score_page
-from tcs.output.report.score_report import CheckSizes, ScoreReport, make_score_report
-from tcs.output.report.write import write_report
+from tcs.output.report.robustness.page import robustness_page
+from tcs.output.report.robustness.paper import Paper, load_paper
+from tcs.output.report.robustness.write import write_report
+from tcs.output.report.score.files import report_paths, write_score_report
+from tcs.output.report.score.page import make_score_page
+from tcs.output.report.score.report import CheckSizes, ScoreReport, make_score_report
+from tcs.output.report.score.row_pictures import RowPictures, draw_row, draw_rows
 
 __all__ = [
     "CheckSizes",

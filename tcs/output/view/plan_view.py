@@ -17,7 +17,7 @@ from tcs.files.writing import whole_file
 from tcs.kernel.arrays import FloatArray
 from tcs.motion import MotionPlan, StopPlan
 from tcs.motion.plan_check import check_names
-from tcs.output.report.pictures import job_title
+from tcs.output.report.score.pictures import job_title
 from tcs.output.view.animation import play_poses, play_visible
 from tcs.output.view.export import overlay
 from tcs.output.view.live import open_meshcat, stay_open, wait

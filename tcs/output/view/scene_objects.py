@@ -14,7 +14,7 @@ from tcs.model.grid import InitialConfiguration
 from tcs.model.scene import Scene, goal_poses
 from tcs.model.tasks import Task
 from tcs.output.draw import BaseFootprint, Category
-from tcs.output.report.scene_solids import base_outline, environment_parts
+from tcs.output.report.score.scene_solids import base_outline, environment_parts
 from tcs.output.view.floor import FloorMap
 from tcs.output.view.shapes import BodyShape, draw_ground, draw_shapes, rgba, robot_shapes
 from tcs.output.view.viewed_set import ViewedSet

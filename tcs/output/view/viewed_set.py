@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.model.grid import Grid, InitialConfiguration
-from tcs.output.report.shown_set import ShownSet
+from tcs.output.report.score.shown_set import ShownSet
 from tcs.output.words import (
     REASON_NAMES,
     REASON_TEXTS,

@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 
 from tcs.model.scene import EnvironmentFile
-from tcs.model.scene.environment import Obstacle as EnvironmentObstacle
+from tcs.model.scene.environment.environment_file import Obstacle as EnvironmentObstacle
 from tcs.placement.constraints import Obstacle
 
 

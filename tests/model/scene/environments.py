@@ -10,8 +10,8 @@ from pydrake.geometry import Box
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
-from tcs.model.scene.environment import EnvironmentFile, load_environment
-from tcs.model.scene.environment_plant import add_environment, environment_parts
+from tcs.model.scene.environment.environment_file import EnvironmentFile, load_environment
+from tcs.model.scene.environment.plant import add_environment, environment_parts
 
 DATA = Path(__file__).parents[2] / "data"
 PROBE_RADIUS = 0.015

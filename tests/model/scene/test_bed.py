@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from tcs.errors import TcsError
 from tcs.model.grid import Grid
-from tcs.model.scene.environment import load_environment
+from tcs.model.scene.environment.environment_file import load_environment
 from tests.model.scene.environments import EnvironmentAlone, numbers, rows
 
 HEAD_RESTS = (0, 35, 70)

@@ -12,7 +12,7 @@ from tcs.kernel.verification.reference import coupled_pose, jacobian, link_poses
 from tcs.model.robots import load_robot
 from tcs.model.scene import Scene, SceneSpec, arm_chain, load_environment
 from tcs.model.scene.contacts import Group
-from tcs.output.report.scene_solids import base_outline
+from tcs.output.report.score.scene_solids import base_outline
 from tcs.placement.scoring import score, verify
 from tests.environments import write_environment
 

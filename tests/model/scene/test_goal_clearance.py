@@ -15,7 +15,7 @@ from pydrake.systems.framework import DiagramBuilder
 from tcs.kernel.arrays import BOX, CAPSULE
 from tcs.model.grid import Grid
 from tcs.model.scene import Scene, SceneSpec, load_environment, lower
-from tcs.model.scene.environment_plant import add_environment, environment_parts
+from tcs.model.scene.environment.plant import add_environment, environment_parts
 from tcs.model.tasks import load_task
 from tests.model.scene.environments import rows
 

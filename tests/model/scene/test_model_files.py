@@ -7,7 +7,7 @@ import pytest
 from tcs.errors import EnvironmentFileError
 from tcs.model.robots import load_robot
 from tcs.model.scene import Scene, SceneSpec, load_environment
-from tcs.model.scene.model_files import check_model_file
+from tcs.model.scene.environment.model_files import check_model_file
 
 MODEL = """\
 <sdf version="1.9"><model name="table">

@@ -23,7 +23,7 @@ from tcs.model.scene import (
     load_environment,
 )
 from tcs.model.scene.contacts import Group
-from tcs.output.report.scene_solids import environment_solids
+from tcs.output.report.score.scene_solids import environment_solids
 from tcs.placement.refinement.space import Space
 from tcs.placement.scoring import load_job, score, verify
 

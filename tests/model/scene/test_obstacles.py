@@ -8,10 +8,10 @@ from tcs.errors import EnvironmentFileError
 from tcs.model.robots.fitting.mesh_shapes import closed_mesh
 from tcs.model.robots.primitives import enclosed, union_volume
 from tcs.model.scene import environment_shapes, load_environment
-from tcs.model.scene.environment import Obstacle
-from tcs.model.scene.environment_check import check_environment
-from tcs.model.scene.obstacle_shapes import obstacle_shapes
-from tcs.model.scene.occupied_cells import boxes_of_cells
+from tcs.model.scene.environment.check import check_environment
+from tcs.model.scene.environment.environment_file import Obstacle
+from tcs.model.scene.environment.obstacle_shapes import obstacle_shapes
+from tcs.model.scene.environment.occupied_cells import boxes_of_cells
 
 GRID = """\
 grid:

@@ -10,8 +10,8 @@ import pytest
 from tcs.errors import TcsError
 from tcs.model.people import draw_bodies, named_postures, scales_of_people
 from tcs.model.scene import PeopleInScene, environment_at, load_environment, with_person
-from tcs.model.scene.person_joints import person_joints
-from tcs.model.scene.resized_person import PARENTS
+from tcs.model.scene.person.joints import person_joints
+from tcs.model.scene.person.resized import PARENTS
 from tcs.placement.scoring import load_job
 from tests.model.scene.environments import EnvironmentAlone
 

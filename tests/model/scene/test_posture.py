@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tcs.model.scene.posture import Posture
+from tcs.model.scene.person.posture import Posture
 
 TURNING = Posture(
     knots_deg=(0, 40, 80), joints={"a": (-0.1, -0.2, -0.55), "b": (0.4, -0.17, -0.51)}

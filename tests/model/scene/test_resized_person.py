@@ -12,9 +12,8 @@ from scipy.spatial.transform import Rotation
 from tcs.errors import EnvironmentFileError
 from tcs.model.people import PAPERS_MAN, Person, papers_man
 from tcs.model.scene import goals_on_person, load_environment, with_person
-from tcs.model.scene.person_covers import cover, padding_for
-from tcs.model.scene.person_shapes import LinkShape
-from tcs.model.scene.resized_person import (
+from tcs.model.scene.person.covers import cover, padding_for
+from tcs.model.scene.person.resized import (
     PARENTS,
     covers_of,
     padding_of,
@@ -22,6 +21,7 @@ from tcs.model.scene.resized_person import (
     person_shapes,
     scales_of,
 )
+from tcs.model.scene.person.shapes import LinkShape
 from tcs.model.tasks import load_task, task_names
 from tests.model.scene.environments import EnvironmentAlone
 

@@ -6,7 +6,7 @@ import pytest
 
 from tcs.model.scene import Scene, SceneSpec, load_environment
 from tcs.output.draw import Category
-from tcs.output.report.scene_solids import environment_parts
+from tcs.output.report.score.scene_solids import environment_parts
 
 COUNTER = """
 <sdf version="1.9">

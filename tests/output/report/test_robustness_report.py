@@ -10,7 +10,7 @@ import pytest
 
 from tcs.errors import OutputError
 from tcs.output.report import as_html, as_markdown, draw_rows, robustness_page, write_report
-from tcs.output.report.tables import is_short, losses_table, table_1, table_3
+from tcs.output.report.robustness.tables import is_short, losses_table, table_1, table_3
 from tcs.output.words import REASON_TEXTS
 from tcs.output.words.robustness import goes_with, lost_goal
 from tests.output.report.test_page import Reader

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tcs.errors import SelectionError
-from tcs.output.report.shown_set import ShownSet
-from tcs.output.report.states import has_states, states_figure
+from tcs.output.report.score.shown_set import ShownSet
+from tcs.output.report.score.states import has_states, states_figure
 from tcs.placement.scoring import score
 from tests.environments import write_environment
 from tests.output.draw.test_map import words

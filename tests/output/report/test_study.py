@@ -10,9 +10,9 @@ import pytest
 from tcs.errors import OutputError
 from tcs.output.report.blocks import Page, Section
 from tcs.output.report.html import as_html
-from tcs.output.report.study import study_page
-from tcs.output.report.study_files import table_csv, write_study_report
-from tcs.output.report.study_tables import comments_table, preference_table
+from tcs.output.report.study.files import table_csv, write_study_report
+from tcs.output.report.study.page import study_page
+from tcs.output.report.study.tables import comments_table, preference_table
 from tcs.teleop.study.participants import new_participant
 from tcs.teleop.study.recording import StudyRecording
 from tcs.teleop.study.results import study_results

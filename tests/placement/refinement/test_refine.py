@@ -11,7 +11,7 @@ import pytest
 import tcs
 from tcs.errors import SelectionError, StoreError, TcsError, UnknownNameError
 from tcs.model.grid import Grid
-from tcs.output.report.shown_set import ShownSet
+from tcs.output.report.score.shown_set import ShownSet
 from tcs.output.view import Controls, ViewedSet
 from tcs.placement.refinement import (
     Points,

@@ -9,7 +9,7 @@ from tcs.capability import read_csv
 from tcs.errors import TcsError
 from tcs.output.report import as_html, as_markdown
 from tcs.output.report.blocks import Collapsible, Picture, Table
-from tcs.output.report.teleop import experiment_page
+from tcs.output.report.teleop.page import experiment_page
 from tcs.teleop import load_arm
 from tcs.teleop.experiment.course import find_course
 from tcs.teleop.experiment.maps import controller_maps

@@ -1,0 +1,1 @@
+"""The environment of a scene: its file, furniture and obstacles, and the plant they make."""

@@ -1,0 +1,234 @@
+"""The page of a score report: base poses, scores, reasons, verification and provenance."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+
+from tcs.output.report.blocks import Block, Code, Collapsible, Facts, Page, Picture, Section, Text
+from tcs.output.report.machine import machine, today, versions
+from tcs.output.report.score.check_tables import success_table, verification_table
+from tcs.output.report.score.goal_tables import goals_table, joints_table
+from tcs.output.report.score.grid_tables import pairs_table, reasons_table
+from tcs.output.report.score.report import ScoreReport
+from tcs.output.report.score.reproduce import commands, success_record
+from tcs.output.report.score.summary import summary_blocks, unreached_everywhere
+from tcs.output.report.score.tours import tours_blocks
+from tcs.output.words import (
+    assigned_goals,
+    frame_name,
+    goal_text,
+    goals_text,
+    member_text,
+    scores_text,
+)
+from tcs.output.words.robustness import BODY_COLLISIONS, error_width
+from tcs.placement.refinement import refinement_summary
+from tcs.placement.tables import SetTable
+
+
+def make_score_page(report: ScoreReport, *, command: str) -> Page:
+    """Return a score report as a page.
+
+    Args:
+        report: The report.
+        command: The command that made it.
+    """
+    spec = report.job.spec
+    sections = [Section("Summary", summary_blocks(report)), Section("Map", _map(report))]
+    if report.states is not None:
+        sections.append(Section("Maps by environment state", _states(report)))
+    if report.views:
+        sections.append(Section("Robot at each stop", _views(report)))
+    sections.append(Section("Goals", _goals(report)))
+    if report.tours is not None:
+        frames = [goal.body_frame for goal in report.job.task.goals]
+        sections.append(Section("Motions", tours_blocks(report.tours, frames)))
+    sections += [
+        Section("Reasons over the grid", _reasons(report)),
+        Section("Verification", _verification(report)),
+        Section("Success under error", _success(report)),
+        *_refined(report),
+        Section("How to reproduce", _provenance(report, command)),
+    ]
+    return Page(
+        title=report.job.task.title,
+        lead=f"Base placement. {spec.environment.title}. {spec.robot.title}.",
+        sections=sections,
+        foot=f"tcs {versions()[0][1]}, {today()}.",
+    )
+
+
+def _map(report: ScoreReport) -> list[Block]:
+    return [
+        Picture(
+            report.map,
+            "png",
+            "Two maps of the environment from above, coloured by the percentage of goals reached "
+            "and by manipulability, with the robot's base at each stop.",
+            "The colour of a base position is the best score of a single configuration there; the "
+            "score of a set can exceed those of its members. Grey: the base is blocked.",
+        )
+    ]
+
+
+def _states(report: ScoreReport) -> list[Block]:
+    if report.states is None:
+        return []
+    return [
+        Picture(
+            report.states,
+            "png",
+            "The map of each state of the environment, in rows and columns.",
+            "All maps share one colour scale. Each stop is marked in the map of its state.",
+        )
+    ]
+
+
+def _views(report: ScoreReport) -> list[Block]:
+    blocks: list[Block] = []
+    for number, view in enumerate(report.views):
+        goals = assigned_goals(report.assignment, number)
+        served = goals_text(goals) if goals else "no goal"
+        blocks.append(
+            Picture(
+                view,
+                "png",
+                f"The robot at stop {number + 1} with its arm at a goal, and a close view of the "
+                "tool.",
+                f"Stop {number + 1}, serves {served}. The robot is drawn as its collision shapes, "
+                "which enclose it. Arrows end at the goals.",
+            )
+        )
+    return blocks
+
+
+def _goals(report: ScoreReport) -> list[Block]:
+    blocks: list[Block] = [goals_table(report)]
+    blocks += [Text(sentence) for sentence in unreached_everywhere(report)]
+    for goal in report.unreached if report.shown.members else ():
+        fix = report.explanation(goal).fix
+        if fix is not None:
+            blocks.append(
+                Text(
+                    f"The cheapest change from stop 1 that reaches goal "
+                    f"{goal_text(goal, report.goal_names[goal])}: {fix.sentence}"
+                )
+            )
+    if report.shown.members:
+        blocks.append(Collapsible("Arm joints", [joints_table(report)]))
+    return blocks
+
+
+def _reasons(report: ScoreReport) -> list[Block]:
+    blocks: list[Block] = [
+        Text(
+            "The checks in their order: contact of the robot's body; contact of the gripper at "
+            "the goal with the environment or the person; reach of the arm; contact of the "
+            "gripper with the robot; joint limits; contact of the arm."
+        ),
+        reasons_table(report),
+    ]
+    pairs = pairs_table(report)
+    return [*blocks, pairs] if pairs.rows else blocks
+
+
+def _verification(report: ScoreReport) -> list[Block]:
+    if not report.sizes.pairs and not report.sizes.dense:
+        return [Text("Nothing was re-checked: this report was made with --pairs 0 --dense 0.")]
+    return [
+        Text(
+            "Stored answers drawn at random are re-checked with Drake's model of the scene: the "
+            "pose of the tool, the joint limits, all distances between bodies, and the dexterity "
+            "measure, computed from Drake's Jacobian."
+        ),
+        verification_table(report),
+    ]
+
+
+def _success(report: ScoreReport) -> list[Block]:
+    table, record = success_table(report), success_record(report)
+    if table is None or record is None:
+        return [
+            Text("The file contains no estimates. This command makes them for the best sets:"),
+            Code(shlex.join(["tcs", "robustify", str(report.path)])),
+        ]
+    widths = "; ".join(
+        f"{frame_name(joint)} ({error_width(error)})" for joint, error in record["errors"].items()
+    )
+    collisions = BODY_COLLISIONS[record["body_collisions"]]
+    blocks: list[Block] = [
+        Text(
+            f"Estimated by tcs {record['program_version']} from up to {record['samples']:,} "
+            f"samples, seed {record['seed']}, with errors of {widths}; collisions {collisions}. In "
+            "each sample the configurations are unchanged and the arm postures are computed again."
+        ),
+        table,
+    ]
+    members = report.shown.stored
+    if members and report.success is not None and report.success.row_of(members) is None:
+        blocks.append(
+            Text(
+                "There is no estimate for the set shown here. `tcs evaluate` estimates the best "
+                "set of a file."
+            )
+        )
+    return blocks
+
+
+def _refined(report: ScoreReport) -> list[Section]:
+    """Return what the refinement of the table gained, if there was one."""
+    if report.scored.refined is None:
+        return []
+    found = refinement_summary(report.file, report.shown.table)
+    before, after = (
+        scores_text(found[key]["reachability"], found[key]["manipulability"], report.measure)
+        for key in ("before", "after")
+    )
+    stops = "; ".join(member_text(member) for member in found["after"]["members"])
+    return [
+        Section(
+            "Between the grid points",
+            [
+                Text(
+                    f"Best set of the grid: {before}. Refined: {after}, from {stops}. No set "
+                    f"between the ends of the grid has P_R + P_M above {found['bound']:.4f}."
+                )
+            ],
+        )
+    ]
+
+
+def _provenance(report: ScoreReport, command: str) -> list[Block]:
+    metadata, timings = report.file.metadata, report.file.metadata["timings"]
+    seconds = timings["total_seconds"] - timings["compile_seconds"]
+    scored: Sequence[tuple[str, str]] = (
+        ("Score file", f"{report.path.name}, SHA-256 {report.sha256}"),
+        ("Scored by", f"tcs {metadata['program_version']}, {metadata['created']}"),
+        ("Task", metadata["task"]),
+        ("Environment", metadata["environment"]),
+        ("Robot", metadata["robot"]),
+        ("Scene", f"SHA-256 {metadata['scene_digest']}; the current models are the same"),
+        ("Inverse kinematics", report.verification.ik),
+        ("Configurations", _configurations(report)),
+        ("Sets", _sets(report.scored.sets)),
+        ("Time to score", f"{seconds:.1f} s without compilation"),
+    )
+    made = (
+        *versions(),
+        *machine(),
+        ("Re-checked", f"{report.sizes.pairs:,} pairs, {report.sizes.dense:,} scanned"),
+        ("Time to make this report", f"{report.seconds:.1f} s"),
+    )
+    return [Code(commands(report, command)), Facts(scored), Facts(made)]
+
+
+def _sets(sets: SetTable) -> str:
+    """Return the rule of the sets in a table, and their number."""
+    apart = f", members at least {sets.min_distance:g} m apart" if sets.max_members > 1 else ""
+    return f"rule {sets.rule}{apart}, {sets.sets:,} in this state table"
+
+
+def _configurations(report: ScoreReport) -> str:
+    size, tables = report.job.grid.size, len(report.file.tables)
+    return f"{size:,}" if tables == 1 else f"{size:,} in each of {tables} state tables"

@@ -1,0 +1,195 @@
+"""Pictures of a score file: its map, and the robot at the members of a set."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from tcs.errors import SelectionError
+from tcs.kernel.arrays import BOX
+from tcs.model.grid import Grid, InitialConfiguration
+from tcs.model.scene import Scene, goal_poses
+from tcs.output.draw import (
+    BaseFootprint,
+    Category,
+    PlaceMap,
+    ScenePanel,
+    draw_map,
+    draw_scene,
+    primitive_corners,
+)
+from tcs.output.report.score.scene_solids import (
+    base_outline,
+    environment_solids,
+    goal_solids,
+    robot_solids,
+)
+from tcs.output.report.score.shown_set import ShownSet
+from tcs.output.words import arm_text, assign_goals, assigned_goals, goals_text
+from tcs.placement.scoring import Job, rebuild_scene
+from tcs.placement.store import ScoreFile, file_of_arm
+
+_AROUND_A_GOAL = primitive_corners(BOX, (0.3, 0.3, 0.3))
+"""Corners of the region shown around the tool [m]: the gripper and the nearby part of the body."""
+
+
+class ScoredScene(NamedTuple):
+    """The job of a score file, and its scene in the observed state of a set."""
+
+    job: Job
+    scene: Scene
+
+
+def scored_scene(
+    file: ScoreFile, shown: ShownSet, *, arm: str | None = None, meshes: bool = False
+) -> ScoredScene:
+    """Return the job and the scene of a score file.
+
+    Args:
+        file: A score file.
+        shown: The set whose observed state the scene is in.
+        arm: The arm of the robot, in a file of several.
+        meshes: Whether the robot's meshes are loaded, for the viewer.
+
+    Raises:
+        StoreMismatchError: If the models are not those the file was made from.
+        SelectionError: If the file is of several arms, and none is given.
+    """
+    of_arm = file if arm is None else file_of_arm(file, arm)
+    job, scene, _ = rebuild_scene(of_arm, meshes=meshes)
+    for name, value in file.observed_states[shown.table].items():
+        scene.set_joint(name, value)
+    return ScoredScene(job, scene)
+
+
+def map_figure(file: ScoreFile, shown: ShownSet, scored: ScoredScene | None = None) -> Figure:
+    """Return the map of a score file.
+
+    Args:
+        file: A score file.
+        shown: The set to mark.
+        scored: The result of `scored_scene`, built if None. The function moves the scene.
+
+    Raises:
+        StoreMismatchError: If the models are not those the file was made from.
+    """
+    # The base is the same with either arm.
+    job, scene = scored or scored_scene(file, shown, arm=next(iter(file.arms), None))
+    base = base_outline(scene)
+    if shown.members:
+        _set_environment(scene, shown.members[0])
+    return draw_map(
+        PlaceMap.of(file.tables[shown.table].scores, Grid.from_dict(file.grid)),
+        environment_solids(scene, in_mount=True),
+        [BaseFootprint(member, base) for member in shown.members],
+        here=BaseFootprint(shown.here, base) if shown.here is not None else None,
+        title=title_of(job, file),
+        subtitle=shown.subtitle,
+        measure=file.metadata["measure"],
+    )
+
+
+def scene_figure(file: ScoreFile, shown: ShownSet) -> Figure:
+    """Return a picture of the robot at each member, its arm at the goal of greatest dexterity.
+
+    Args:
+        file: A score file.
+        shown: The set.
+
+    Raises:
+        StoreMismatchError: If the models are not those the file was made from.
+        SelectionError: If the set has no member.
+    """
+    if not shown.members:
+        raise SelectionError(
+            "nothing to draw: no initial configuration reaches a goal. `tcs map` shows where the "
+            "base can be placed."
+        )
+    scored = {
+        arm: scored_scene(file, shown, arm=arm)
+        for arm in dict.fromkeys(member.arm for member in shown.members)
+    }
+    panels = [
+        _member_panel(file, scored[member.arm], shown, i) for i, member in enumerate(shown.members)
+    ]
+    title = title_of(next(iter(scored.values())).job, file)
+    return draw_scene(panels, title=f"{title}\n{shown.subtitle}")
+
+
+def member_figure(
+    file: ScoreFile, shown: ShownSet, number: int, scored: ScoredScene | None = None
+) -> Figure:
+    """Return two pictures of the robot at one member of the set: the whole robot, and its tool.
+
+    Args:
+        file: A score file.
+        shown: The set.
+        number: Number of the member, from 0.
+        scored: The result of `scored_scene`, built if None. The function moves the scene.
+
+    Raises:
+        StoreMismatchError: If the models are not those the file was made from.
+    """
+    scored = scored or scored_scene(file, shown)
+    panels = [_member_panel(file, scored, shown, number, is_close=it) for it in (False, True)]
+    return draw_scene(panels, title="")
+
+
+def title_of(job: Job, file: ScoreFile) -> str:
+    """Return the titles of task, environment and robot, with the arms of a file of several."""
+    if file.arms:
+        return job_title(job, f"{file.robot['name']}, {' or '.join(file.arms)} arm")
+    return job_title(job)
+
+
+def job_title(job: Job, robot: str | None = None) -> str:
+    """Return the titles of task, environment and robot; `robot` replaces that of its file."""
+    return f"{job.task.title} · {job.spec.environment.title} · {robot or job.spec.robot.title}"
+
+
+def _set_environment(scene: Scene, member: InitialConfiguration) -> None:
+    """Set the joints of the environment to those of a configuration."""
+    for name, value in member.environment:
+        scene.set_joint(name, value)
+
+
+def _member_panel(
+    file: ScoreFile, scored: ScoredScene, shown: ShownSet, number: int, *, is_close: bool = False
+) -> ScenePanel:
+    """Return the panel of one member: robot and person, or a close view of the tool at its goal."""
+    job, scene = scored
+    member, h = shown.members[number], shown.rows[number]
+    scores = shown.scores
+    served = assigned_goals(assign_goals(scores, shown.rows), number)
+    current = max(served, key=lambda g: float(scores.dexterity[h, g]), default=None)
+    _set_environment(scene, member)
+    scene.place_base(member.base_x, member.base_y, member.base_yaw)
+    scene.set_torso(member.torso)
+    joints = scores.joints_of(h, current) if current is not None else None
+    if joints is not None:
+        scene.set_arm(joints)
+    solids = [
+        *robot_solids(scene),
+        *environment_solids(scene),
+        *goal_solids(scene, job.task, current),
+    ]
+    goals = np.array([X_WG.translation() for X_WG in goal_poses(scene, job.task)])
+    base = scene.base_pose().translation()
+    # Views across the line from robot to person, from both sides: neither hides the other.
+    along = math.atan2(*(goals.mean(axis=0) - base)[[1, 0]])
+    if is_close and current is not None:
+        subject, angles_deg = goals[current] + _AROUND_A_GOAL, [60.0, -60.0, 120.0, -120.0]
+        caption = f"the tool at goal {current}"
+    else:
+        # Furniture may extend beyond the picture; robot, person and goals may not.
+        whole = [solid.corners for solid in solids if solid.category is not Category.FURNITURE]
+        subject, angles_deg = np.concatenate(whole), [70.0, -70.0]
+        arm = f", {arm_text(member.arm)}" if member.arm else ""
+        caption = f"stop {number + 1}{arm}, serves {goals_text(served) if served else 'no goal'}"
+        if current is not None:
+            caption += f"; arm at goal {current}"
+    azimuths = tuple(along + math.radians(angle) for angle in angles_deg)
+    return ScenePanel(solids, subject, azimuths, caption)

@@ -1,0 +1,134 @@
+"""The summary of a score report: the set, its scores, and the result of the verification."""
+
+from __future__ import annotations
+
+from tcs.output.report.blocks import Block, Bullets
+from tcs.output.report.score.goal_tables import stops_table
+from tcs.output.report.score.report import ScoreReport
+from tcs.output.words import (
+    REASON_TEXTS,
+    base_pose_text,
+    goals_text,
+    percent,
+    percentage,
+    person_text,
+    settings_text,
+    stop_places,
+)
+from tcs.placement.constraints import constraint_texts
+from tcs.placement.store import state_to_json
+from tcs.placement.tables import Reason
+
+LIMITS = (
+    "Each goal is checked by itself in a static scene. The approach to a goal, the path of the arm "
+    "between goals and the path of the base between stops are not checked."
+)
+
+
+def summary_blocks(report: ScoreReport) -> list[Block]:
+    """Return the summary: what is reached from where, and the stops."""
+    reachability, manipulability = report.scores
+    members, goals = len(report.shown.members), report.goals
+    if not members:
+        text = f"No configuration of the grid reaches any of the {goals} goals."
+        return [Bullets([text, *unreached_everywhere(report), _soundness(report), LIMITS])]
+    reached = goals - len(report.unreached)
+    stops = ("one base pose", "two base poses", "three base poses")[members - 1]
+    items = [
+        f"From {stops} the robot reaches {reached} of {goals} goals (P_R "
+        f"{percentage(reachability)}); P_M is {manipulability:.3f} ({report.measure})."
+    ]
+    items += stop_places(report.file, report.shown.table, report.shown.indices)
+    if report.unreached:
+        items.append(
+            f"Not reached: {goals_text(report.unreached, report.goal_names)}. The section Goals "
+            "gives the reasons and the changes that would help."
+        )
+    if report.shown.here is not None:
+        here = base_pose_text(report.shown.here.to_json())
+        items.append(f"The set is selected with the default weights for a robot at {here}.")
+    else:
+        of_size = "" if report.max_members is None else f" of at most {report.max_members}"
+        items.append(
+            f"Of the sets{of_size} in the file this one has the greatest P_R + P_M, regardless of "
+            "the current base pose of the robot."
+        )
+    state = report.file.observed_states[report.shown.table]
+    if state:
+        values = settings_text(state_to_json(report.file.observed_axes, state))
+        tables = len(report.file.tables)
+        of_states = f" (one of {tables} states in the file)" if tables > 1 else ""
+        items.append(f"The scores are those of the observed state {values}{of_states}.")
+    items += _person(report) + _constraints(report) + _success(report)
+    return [Bullets([*items, _soundness(report), LIMITS]), stops_table(report)]
+
+
+def unreached_everywhere(report: ScoreReport) -> list[str]:
+    """Return the goals that no configuration reaches, with the last check that stopped them."""
+    found: dict[str, list[int]] = {}
+    for goal, counts in enumerate(report.distributions):
+        if counts.reached == 0 and counts.farthest is not None:
+            found.setdefault(REASON_TEXTS[counts.farthest.reason], []).append(goal)
+    return [
+        f"No configuration reaches {goals_text(goals, report.goal_names)}. Result of the "
+        f"configurations that passed the most checks: {reason}."
+        for reason, goals in found.items()
+    ]
+
+
+def _person(report: ScoreReport) -> list[str]:
+    """Return for whom the file was scored, if not for the papers' man."""
+    entry = report.file.metadata.get("person")
+    return [] if entry is None else [f"Scored for {person_text(entry)}."]
+
+
+def _constraints(report: ScoreReport) -> list[str]:
+    """Return the constraints under which the file was scored, if there were any."""
+    texts = constraint_texts(report.file)
+    if not texts:
+        return []
+    excluded = report.distributions[0].reasons[Reason.EXCLUDED]
+    ending = f"; {excluded:,} configurations were excluded and not scored" if excluded else ""
+    return [f"Scored under constraints: {'; '.join(texts)}{ending}."]
+
+
+def _soundness(report: ScoreReport) -> str:
+    """Return what the verification shows."""
+    found = report.verification
+    if not report.is_sound:
+        return (
+            "SOME ANSWERS OF THE FILE ARE FALSE: do not use it. The sections Goals and "
+            "Verification show which checks fail."
+        )
+    parts = []
+    if found.checked:
+        shown = f"each of the {len(report.findings)} postures shown here and "
+        parts.append(
+            f"Drake confirms {shown if report.findings else ''}all of {found.checked:,} stored "
+            "answers drawn at random"
+        )
+    elif report.findings:
+        parts.append(f"Drake confirms each of the {len(report.findings)} postures shown here")
+    if found.dense_checked:
+        parts.append(
+            f"of {found.dense_checked:,} unreached pairs drawn at random, {found.missed:,} are "
+            "reachable"
+        )
+    if not parts:
+        return "Nothing was re-checked with Drake."
+    text = "; ".join(parts)
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def _success(report: ScoreReport) -> list[str]:
+    """Return the estimated success of the set under error, if there is an estimate."""
+    success = report.success
+    members = report.shown.stored
+    row = success.row_of(members) if success is not None and members else None
+    if success is None or row is None:
+        return []
+    low, high = percent(float(success.low[row])), percentage(float(success.high[row]))
+    return [
+        "Estimated success in the randomly perturbed environment: "
+        f"{percentage(float(success.success[row]))} of the goals (95% between {low} and {high})."
+    ]

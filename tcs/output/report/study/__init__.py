@@ -1,0 +1,1 @@
+"""The report of a study with people: its page, tables and files."""
