@@ -78,6 +78,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "head_turn": (),
     "postures": (),
     "people": (),
+    "person_shapes": ("--bodies", "300"),
     "equal_reachability": ("--scores", SCORES),
     "printed_grid": (),
     "row_measures": (),

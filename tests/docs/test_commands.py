@@ -9,7 +9,7 @@ import pytest
 import typer.main
 
 from tcs.cli.app import app
-from tcs.model.tasks.files import GoalEntry, TaskFile
+from tcs.model.tasks.files import GoalEntry, SurfaceEntry, TaskFile
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 PAGES = [CHECKOUT / "README.md", *sorted((CHECKOUT / "docs").rglob("*.md"))]
@@ -70,7 +70,7 @@ def options_of_scripts() -> set[str]:
 def test_options_named_in_a_sentence_are_there(page):
     known = options_of(typer.main.get_command(app)) | options_of_scripts()
     spans = re.findall(r"`([^`\n]+)`", page.read_text(encoding="utf-8"))
-    named = {option for span in spans for option in re.findall(r"(?<!\S)--[a-z][a-z-]*", span)}
+    named = {option for span in spans for option in re.findall(r"(?<!\S)--[a-z][a-z0-9-]*", span)}
     assert named - known == set()
 
 
@@ -83,7 +83,10 @@ def test_commands_named_in_a_sentence_are_there(page):
         command = commands[verb]
         for word in rest.split():
             command = getattr(command, "commands", {}).get(word, command)
-        assert set(re.findall(r"(?<!\S)--[a-z][a-z-]*", rest)) <= options_of(command), (verb, rest)
+        assert set(re.findall(r"(?<!\S)--[a-z][a-z0-9-]*", rest)) <= options_of(command), (
+            verb,
+            rest,
+        )
 
 
 def test_an_unknown_option_is_refused():
@@ -91,9 +94,15 @@ def test_an_unknown_option_is_refused():
         test_line_is_understood("tcs score shaving --enviroment wheelchair")
 
 
+def keys_in_tables(text: str) -> set[str]:
+    return set(re.findall(r"`(\w+)`", "".join(re.findall(r"^\| (.*?) \|", text, flags=re.M))))
+
+
 def test_table_of_task_keys_is_complete():
     text = (CHECKOUT / "docs" / "adding.md").read_text(encoding="utf-8")
     section = text[text.index("## A task") : text.index("## A robot")]
-    listed = set(re.findall(r"`(\w+)`", "".join(re.findall(r"^\| (.*?) \|", section, flags=re.M))))
-    assert listed == set(TaskFile.model_fields)
+    start = section.index("### Goals all over a surface")
+    of_task, of_surface = section[:start], section[start : section.index("\n#", start + 1)]
+    assert keys_in_tables(of_task) == set(TaskFile.model_fields)
+    assert keys_in_tables(of_surface) == set(SurfaceEntry.model_fields)
     assert all(f"`{key}`" in section for key in GoalEntry.model_fields)

@@ -325,21 +325,22 @@ def test_a_refined_set_is_evaluated_like_one_of_the_grid(scored, refined):
         evaluate_refined(scored)
 
 
-def test_plans_stop_where_the_refined_set_is(refined):
+@pytest.mark.parametrize("chosen", [True, pytest.param(False, marks=pytest.mark.slow)])
+def test_plans_stop_where_the_refined_set_is(refined, chosen):
     free = tcs.UtilityWeights(travel=0.0)
     choice = tcs.select(refined, HERE, weights=free)
     table = refined.nominal.refined
-    for members in (choice, RefinedSet(0, choice.refined, choice.order)):
-        found = tcs.plan(refined, members)
-        for stop, i in zip(found.stops, choice.order, strict=True):
-            at, expected = stop.at, choice.members[i]
-            assert stop.index is None
-            assert [at.base_x, at.base_y, at.base_yaw, at.torso] == pytest.approx(
-                [expected.base_x, expected.base_y, expected.base_yaw, expected.torso]
-            )
-        assert found.false == 0
-        reached = table.reached[choice.refined].any(axis=0)
-        assert [result.reason == "unreached" for result in found.results] == list(~reached)
+    members = choice if chosen else RefinedSet(0, choice.refined, choice.order)
+    found = tcs.plan(refined, members)
+    for stop, i in zip(found.stops, choice.order, strict=True):
+        at, expected = stop.at, choice.members[i]
+        assert stop.index is None
+        assert [at.base_x, at.base_y, at.base_yaw, at.torso] == pytest.approx(
+            [expected.base_x, expected.base_y, expected.base_yaw, expected.torso]
+        )
+    assert found.false == 0
+    reached = table.reached[choice.refined].any(axis=0)
+    assert [result.reason == "unreached" for result in found.results] == list(~reached)
 
 
 def test_a_refined_set_is_shown(scored, refined):
