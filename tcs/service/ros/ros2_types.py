@@ -71,7 +71,7 @@ class Ros2Types:
         return self._store.deserialize_cdr(data, name)
 
     def hash_of(self, name: str) -> str:
-        """Return the hash of a type, service or action part (REP 2011), e.g. "RIHS01_..."."""
+        """Return the hash of a type, service or action part (REP 2011)."""
         return str(self._store.hash_rihs01(name))
 
     def _empty(self, name: str) -> dict[str, Any]:
