@@ -1,4 +1,4 @@
-"""The least success under error that a refined set keeps: that of the best set of the grid."""
+"""Success under error that refined sets keep: judged in other samples than those of the search."""
 
 from __future__ import annotations
 
@@ -117,6 +117,31 @@ def settled(walks: Sequence[Walk], screen: SuccessFloor, judge: SuccessFloor) ->
         judged.update(map(id, first))
         kept = sorted([*first, *kept[1:]], key=_worst_last)
     return kept
+
+
+def at_surest(walks: Sequence[Walk], samples: Samples, weights: FloatArray) -> list[Walk]:
+    """Return walks moved back to the place of their course that is the surest in other samples.
+
+    In the samples of a search the last place is always the best: a few of them are easily
+    satisfied, by sets next to a loss that others show. Of equal places the last is taken.
+
+    Args:
+        walks: The walks.
+        samples: Samples that the search did not see.
+        weights: Weights of the goals, sum 1, shape (G,).
+
+    Returns:
+        The walks, the surest first.
+    """
+    courses = [[place.points for place, _ in walk.course] for walk in walks]
+    found = successes(samples, weights, [points for course in courses for points in course])
+    ends = np.cumsum([len(course) for course in courses])
+    reached = []
+    for walk, values in zip(walks, np.split(found, ends[:-1]), strict=True):
+        moves = int(np.argmax(values[::-1]))
+        reached.append(float(values[values.size - 1 - moves]))
+        walk.move_back(moves)
+    return [walks[k] for k in sorted(range(len(walks)), key=lambda k: -reached[k])]
 
 
 def _worst_last(walk: Walk) -> float:

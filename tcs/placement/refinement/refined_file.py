@@ -5,16 +5,25 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
 from tcs.errors import SelectionError, TcsError, UnknownNameError
+from tcs.kernel.arrays import BoolArray
 from tcs.model.random_streams import check_draws, named_generator
 from tcs.placement.refinement.bound import upper_bound
 from tcs.placement.refinement.displaced import DisplacedBases
-from tcs.placement.refinement.floor import HARDEST, RememberedSamples, SuccessFloor, settled
+from tcs.placement.refinement.floor import (
+    HARDEST,
+    RememberedSamples,
+    SuccessFloor,
+    at_surest,
+    settled,
+    successes,
+)
 from tcs.placement.refinement.objectives import (
     BallObjective,
     Features,
@@ -39,6 +48,8 @@ OBJECTIVES = ("score", "success", "margin", "ball", "toc")
 """What a refinement maximises: P_R + P_M, the success under the errors of the environment, the
 success with the base displaced, the radius within which a displaced base loses no goal, or the
 score of TOC."""
+BY_SUCCESS = ("success", "margin")
+"""Objectives that are the success in samples."""
 WITHOUT_SAMPLES = ("score", "toc")
 """Objectives that depend on the scores alone."""
 KEY = "refinement"
@@ -59,6 +70,8 @@ FRESH_SAMPLES = 500
 """Samples on which the refined set is judged."""
 CHECK_STREAM = "refinement check"
 """Name of their random stream."""
+CHOICE_STREAM = "refinement choice"
+"""Name of the random stream of as many samples, in which the surest place of a search is chosen."""
 _SCORE_ONLY = UtilityWeights(travel=0.0, places=0.0, environment=0.0)
 
 
@@ -155,6 +168,10 @@ def refine(
         )
         walks = settled(walks, screen, judge)
         needed = judge.keeps_of_sets
+    elif objective in BY_SUCCESS:
+        choosing = RememberedSamples(draw(FRESH_SAMPLES, CHOICE_STREAM))
+        walks = at_surest(walks, choosing, sets.weights)
+        needed = partial(_as_sure_as, walks[0].present.points, choosing, sets)
     first = without_idle_members(walks[0], search.objective, needed)
     walks = [first, *walks[1:]]
     refined = _as_table(walks, sets.weights)
@@ -281,6 +298,14 @@ def _floor(search: LocalSearch, samples: Samples, sets: SetTable) -> SuccessFloo
     """Return the success of the best sets of the grid in some samples."""
     single, best = search.points_of(sets.best_single), search.points_of(sets.best)
     return SuccessFloor.of(samples, sets.weights, single, best)
+
+
+def _as_sure_as(
+    least: Points, samples: Samples, sets: SetTable, others: Sequence[Points]
+) -> BoolArray:
+    """Return which sets have at least the success of one set in some samples, shape (n,)."""
+    first, *found = successes(samples, sets.weights, [least, *others])
+    return np.asarray(np.array(found) >= first)
 
 
 def _success(

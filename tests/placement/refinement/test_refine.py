@@ -21,7 +21,7 @@ from tcs.placement.refinement import (
     score_members,
 )
 from tcs.placement.refinement.displaced import ANGLE, RADIUS, DisplacedBases
-from tcs.placement.refinement.floor import SLACK, settled
+from tcs.placement.refinement.floor import SLACK, at_surest, settled
 from tcs.placement.refinement.objectives import ScoreObjective
 from tcs.placement.refinement.perturbed import PerturbedPoints
 from tcs.placement.refinement.search import Evaluated, LocalSearch, Walk
@@ -190,11 +190,30 @@ def test_walks_move_to_sets_that_satisfy_the_condition(scored, rng):
     assert tried
 
 
-def test_walks_move_back_until_they_keep_the_floor():
-    def stand(x):
-        rows = np.zeros((1, 2))
-        return Evaluated(np.array([[x]]), np.zeros(1, dtype=np.int64), *[rows] * 5)
+def stand(x):
+    rows = np.zeros((1, 2))
+    return Evaluated(np.array([[x]]), np.zeros(1, dtype=np.int64), *[rows] * 5)
 
+
+def test_walks_move_back_to_the_surest_place():
+    class Peaks:
+        samples = 1
+
+        def reached(self, points):
+            # Two goals between 0.5 and 2.5, one elsewhere up to 3.5, none beyond.
+            x = points.values[:, 0]
+            return np.stack([x < 3.5, (x > 0.5) & (x < 2.5)], axis=-1)[:, None]
+
+    walks = [Walk((0,), stand(3.0), 9.0), Walk((1,), stand(0.0), 0.0), Walk((2,), stand(5.0), 5.0)]
+    for x in (1.0, 2.0, 3.0, 4.0):
+        walks[1].move(stand(x), x)
+    found = at_surest(walks, Peaks(), np.array([0.5, 0.5]))
+    # Of equally sure places the last.
+    assert [(walk.origin, walk.value) for walk in found] == [((1,), 2.0), ((0,), 9.0), ((2,), 5.0)]
+    assert len(found[0].passed) == 2
+
+
+def test_walks_move_back_until_they_keep_the_floor():
     class Floor:
         def keeps(self, sets):
             return np.array([points.values[0, 0] <= self.most for points in sets])
