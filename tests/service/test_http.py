@@ -8,6 +8,7 @@ import socket
 
 import httpx
 import pytest
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from tcs.errors import OutputError, ServiceError
 from tcs.placement.store import save_scores
@@ -117,6 +118,21 @@ def test_only_this_machine_without_a_token():
         checked_access("0.0.0.0", "short")
     assert checked_access("0.0.0.0", TOKEN).token == TOKEN
     assert checked_access("::1", None).token is None
+
+
+def test_answers_are_sent_at_once(server, monkeypatch):
+    # Otherwise the body of an answer waits until the client has acknowledged its head, some 40 ms.
+    at_once, connection_made = [], H11Protocol.connection_made
+
+    def connected(protocol, transport):
+        connection = transport.get_extra_info("socket")
+        at_once.append(connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY))
+        connection_made(protocol, transport)
+
+    monkeypatch.setattr(H11Protocol, "connection_made", connected)
+    httpx.get(f"{server.url}/openapi.json")
+    assert at_once
+    assert all(at_once)
 
 
 def test_port_in_use_is_one_line(server):
