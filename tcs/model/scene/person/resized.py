@@ -2,7 +2,7 @@
 
 Every link is stretched along the axes of its frame by `tcs.model.people.link_scales`, and so are
 the positions of the joints on it: links stay connected. Its shapes enclose the stretched skin
-(`person_covers`). A seated person keeps their thighs on the
+(`covers`). A seated person keeps their thighs on the
 seat and their back at the back rest; a lying one their back on the mattress and their hips where
 the bed bends.
 """
