@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -140,7 +141,7 @@ def _prepared(
             ]
         scenes = PeopleInScene(arm.lowered, arm.scene, arm.job.task, positions)
         in_states = np.stack(states, axis=1)
-        arrays = scenes.arrays_for(scales[int(columns[0])], in_states[0])
+        (arrays,) = scenes.arrays_of([scales[int(columns[0])]], in_states[:1])
         arrays = arrays._replace(body_vs_environment=arm.body_pairs[:, scenes.rows])
         problems = PersonProblems(arrays, str(trials.file.metadata["measure"]))
         yield _Prepared(scenes, problems, poses, rows, place, in_states)
@@ -160,15 +161,13 @@ def _evaluated(
         batch: Numbers of the people.
         first: Number of the first person of the chunk.
     """
-    found = []
-    for person in batch.tolist():
-        reasons: dict[int, NDArray[np.uint8]] = {}
-        for arm in prepared:
-            arrays = arm.scenes.arrays_for(scales[person], arm.states[person - first])
+    people = [scales[person] for person in batch.tolist()]
+    found: dict[int, list[NDArray[np.uint8]]] = defaultdict(list)
+    for arm in prepared:
+        for arrays in arm.scenes.arrays_of(people, arm.states[batch - first]):
             problem = arm.problems.of(arrays)
             scenes = PerturbedScenes(problem, gripper_contacts(problem))
             for row, place in zip(arm.rows.tolist(), arm.place.tolist(), strict=True):
                 scores = scenes.scores(arm.poses, Run(row, place, place + 1))
-                reasons[row] = scores.reason[0]
-        found.append([reasons[row] for row in range(len(reasons))])
-    return np.swapaxes(np.array(found, dtype=np.uint8), 0, 1)
+                found[row].append(scores.reason[0])
+    return np.array([found[row] for row in range(len(found))], dtype=np.uint8)

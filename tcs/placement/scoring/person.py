@@ -40,9 +40,9 @@ def person_entry(
     touching = _touching(f"{environment.person_model}::", tables)
     for goal, part in touching.items():
         _log.warning(
-            "goal %d is too near to this person: the gripper touches %s in some or all states of "
+            "goal %s is too near to this person: the gripper touches %s in some or all states of "
             "the environment. Goals are moved with the skin, and not changed otherwise.",
-            goal,
+            f"{goal} ({name})" if (name := task.goals[goal].name) else goal,
             part,
         )
     goals = [

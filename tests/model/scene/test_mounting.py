@@ -104,7 +104,7 @@ def test_people_of_other_sizes_are_seen_from_the_mount(on_head_rest):
     scene = on_head_rest.scene()
     people = PeopleInScene(on_head_rest.lowered(scene), scene, task, STATES)
     drawn = draw_bodies(1, seed=4)
-    found = people.arrays_for(scales_of_people(drawn)[0], np.array([1]))
+    (found,) = people.arrays_of(scales_of_people(drawn), np.array([[1]]))
     body = drawn[0]
     person = {"sex": body.sex, **body.measures}
     alone = load_job(task, on_head_rest.spec.environment, "jaco", person=person)

@@ -222,7 +222,7 @@ def test_people_in_a_posture_equal_the_resized_scene(name, task, angles):
     scene = job.scene()
     drawn = draw_bodies(1, seed=4)
     people = PeopleInScene(job.lowered(scene), scene, job.task, states)
-    found = people.arrays_for(scales_of_people(drawn)[0], np.array([0, 1]))
+    (found,) = people.arrays_of(scales_of_people(drawn), np.array([[0, 1]]))
     alone = load_job(task, name, "pr2", person={"sex": drawn[0].sex, **drawn[0].measures, **angles})
     resized = alone.scene()
     expected = environment_at(alone.lowered(resized), resized, alone.task, states)

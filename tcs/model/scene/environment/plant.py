@@ -135,7 +135,7 @@ def environment_parts(
         model = link.split("::", maxsplit=1)[0]
         for geometry in plant.GetCollisionGeometriesForBody(body):
             name = link if model in added.named_by_link else inspector.GetName(geometry)
-            pad = padding_of(environment, link, scales)
+            pad = float(padding_of(environment, link, scales))
             parts.append(Part(geometry, body.index(), Group.ENVIRONMENT, 0, name, pad))
     if added.floor:
         world = plant.world_body()

@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tcs.kernel.arrays import FloatArray
-from tcs.model.people import Scale
 from tcs.model.scene.person.shapes import LinkShape
 
 WIDE = 0.03
@@ -24,14 +24,17 @@ _STRAIGHT = 1e-6
 """Greatest change of a unit vector along an axis that is rounding of the model file."""
 
 
-def padding_for(padding: float, scale: Scale) -> float:
+def padding_for(padding: float, scale: ArrayLike) -> FloatArray:
     """Return the padding of a stretched link [m], at most that of the papers' man.
 
     Args:
         padding: That of the papers' man [m].
-        scale: How the link is stretched.
+        scale: How the link is stretched, shape (..., 3): of one person or of many.
+
+    Returns:
+        Shape (...).
     """
-    return padding * min(1.0, *scale)
+    return np.asarray(padding * np.minimum(1.0, np.min(scale, axis=-1)))
 
 
 def parts_of(shape: LinkShape, *, is_uneven: bool) -> int:
@@ -45,27 +48,39 @@ def parts_of(shape: LinkShape, *, is_uneven: bool) -> int:
     return 2 if is_uneven and not shape.is_box and shape.size[0] > WIDE else 1
 
 
-def cover(shape: LinkShape, scale: Scale, padding: float, parts: int = 1) -> tuple[LinkShape, ...]:
+def cover(
+    shape: LinkShape, scale: ArrayLike, padding: float, parts: int = 1
+) -> tuple[LinkShape, ...]:
     """Return shapes that with their padding enclose a shape and its skin, stretched.
 
     Args:
         shape: A shape K of the papers' man.
-        scale: How its link is stretched along x, y and z.
+        scale: How its link is stretched along x, y and z, shape (..., 3): of one person or of many.
         padding: How far the skin of the papers' man may stand out of it [m].
         parts: Number of shapes, 1 or for a capsule 2, side by side.
 
     Returns:
-        The shapes, to be padded by `padding_for`. For the papers' man it is the shape itself,
-        `parts` times.
+        The shapes, to be padded by `padding_for`; size and position have the leading axes of the
+        scale, and so has the orientation if it is not that of K. For the papers' man it is the
+        shape itself, `parts` times.
     """
-    if scale == (1.0, 1.0, 1.0):
-        return (shape,) * parts
-    if shape.is_box:
-        return (_box(shape, np.array(scale), padding),)
-    return _capsules(shape, np.array(scale), padding, parts)
+    scale = np.asarray(scale, dtype=float)
+    is_same = np.all(scale == 1.0, axis=-1, keepdims=True)
+    covers = (
+        _box(shape, scale, padding) if shape.is_box else _capsules(shape, scale, padding, parts)
+    )
+    return tuple(
+        LinkShape(
+            shape.is_box,
+            np.where(is_same, shape.size, one.size),
+            one.R_LS,
+            np.where(is_same, shape.p_LoSo_L, one.p_LoSo_L),
+        )
+        for one in covers
+    )
 
 
-def _box(shape: LinkShape, scale: FloatArray, padding: float) -> LinkShape:
+def _box(shape: LinkShape, scale: FloatArray, padding: float) -> tuple[LinkShape]:
     """Return the box with edges in the same directions around a stretched box.
 
     Let p be the new padding and N = P S - p I, which has no negative entry. The skin stands out of
@@ -74,10 +89,10 @@ def _box(shape: LinkShape, scale: FloatArray, padding: float) -> LinkShape:
     encloses it.
     """
     R = shape.R_LS
-    stretched = np.abs(R.T @ (scale[:, None] * R)) @ shape.size
-    N = padding * scale - padding_for(padding, tuple(scale))
-    size = stretched + np.linalg.norm(N[:, None] * R, axis=0)
-    return LinkShape(True, size, R, scale * shape.p_LoSo_L)
+    stretched = np.matvec(np.abs(R.T @ (scale[..., :, None] * R)), shape.size)
+    N = padding * scale - padding_for(padding, scale)[..., None]
+    size = stretched + np.linalg.norm(N[..., :, None] * R, axis=-2)
+    return (LinkShape(True, size, R, scale * shape.p_LoSo_L),)
 
 
 def _capsules(
@@ -97,43 +112,38 @@ def _capsules(
     radius, half = shape.size
     axis = shape.R_LS[:, 2]
     mapped = scale * axis
-    length = float(np.linalg.norm(mapped))
-    direction = mapped / length
+    length = np.linalg.norm(mapped, axis=-1)
+    direction = mapped / length[..., None]
     i = int(np.argmax(np.abs(axis)))
-    first, second = sorted((k for k in range(3) if k != i), key=lambda k: -scale[k])
-    L, T1, T2 = (float(radius + padding) * float(scale[k]) for k in (i, first, second))
-    along = math.copysign(1.0, direction[i]) * np.eye(3)[i]
-    inclined = float(np.linalg.norm(direction - along))
-    thick, apart, longer = min(
-        _around(L, T1, T2, B, inclined, parts) for B in {T1, T2, min(T1, max(T2, L))}
-    )
-    thick -= padding_for(padding, tuple(scale))
+    j, k = (other for other in range(3) if other != i)
+    first = np.where(scale[..., j] >= scale[..., k], j, k)
+    half_axes = (radius + padding) * scale
+    L, T1 = half_axes[..., i], np.maximum(half_axes[..., j], half_axes[..., k])
+    T2 = np.minimum(half_axes[..., j], half_axes[..., k])
+    inclined = np.linalg.norm(direction - math.copysign(1.0, axis[i]) * np.eye(3)[i], axis=-1)
+    choices = (T1, T2, np.minimum(T1, np.maximum(T2, L))) if parts == 2 else (T1,)
+    B = np.array(choices)
+    thickness = (T1**2 + B**2) / (2.0 * T1) + np.maximum(0.0, L - B) * inclined
+    B = np.take_along_axis(B, np.argmin(thickness, axis=0)[None], axis=0)[0]
+    thick = np.min(thickness, axis=0) - padding_for(padding, scale)
+    long = np.maximum(half * length + np.maximum(0.0, L - B), _THINNEST / 2)
+    is_turned = np.abs(direction - axis).max(axis=-1) > _STRAIGHT
     R = shape.R_LS
-    if np.abs(direction - axis).max() > _STRAIGHT:
-        R = np.asarray(_turn(axis, direction) @ R)
-    size = np.array([thick, max(half * length + longer, _THINNEST / 2)])
-    centre, aside = scale * shape.p_LoSo_L, apart * np.eye(3)[first]
+    if np.any(is_turned):
+        R = np.where(is_turned[..., None, None], _turn(axis, direction) @ R, R)
+    size, centre = np.stack([thick, long], axis=-1), scale * shape.p_LoSo_L
     if parts == 1:
         return (LinkShape(False, size, R, centre),)
+    aside = ((T1**2 - B**2) / (2.0 * T1))[..., None] * np.eye(3)[first]
     return LinkShape(False, size, R, centre + aside), LinkShape(False, size, R, centre - aside)
 
 
-def _around(
-    L: float, T1: float, T2: float, B: float, inclined: float, parts: int
-) -> tuple[float, float, float]:
-    """Return radius, offset along T1 and lengthening of the capsules for a choice of B [m]."""
-    if parts == 1:
-        B = T1
-    longer = max(0.0, L - B)
-    return (T1**2 + B**2) / (2.0 * T1) + longer * inclined, (T1**2 - B**2) / (2.0 * T1), longer
-
-
 def _turn(before: FloatArray, after: FloatArray) -> FloatArray:
-    """Return the least rotation that takes one unit vector to another, not opposite, one.
+    """Return the least rotations that take a unit vector to others, not opposite, (..., 3, 3).
 
     With v = before x after and its matrix V, it is I + V + V^2 / (1 + before . after).
     """
-    (a, b, c), (d, e, f) = before.tolist(), after.tolist()
-    x, y, z = b * f - c * e, c * d - a * f, a * e - b * d
-    V = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + V + V @ V / (1.0 + a * d + b * e + c * f))
+    # v x e_m is column m of V.
+    V = np.swapaxes(np.cross(np.cross(before, after)[..., None, :], np.eye(3)), -1, -2)
+    cosine = np.vecdot(before, after)[..., None, None]
+    return np.asarray(np.eye(3) + V + V @ V / (1.0 + cosine))

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tcs.kernel.arrays import FloatArray
-from tcs.model.people import Scale
 from tcs.model.scene.environment.environment_file import EnvironmentFile
 from tcs.model.scene.person.resized import covers_of, padding_of, person_shapes, scales_of
 from tcs.model.scene.person.shapes import LinkShape
@@ -70,16 +70,17 @@ class Anchor:
         return cls(number, distance, shape.p_LoSo_L + shape.R_LS @ surface, shape.R_LS @ normal)
 
     def position(
-        self, scale: Scale, covers: Sequence[Sequence[LinkShape]], padding: float
+        self, scale: ArrayLike, covers: Sequence[Sequence[LinkShape]], padding: ArrayLike
     ) -> FloatArray:
-        """Return the position of the goal on a resized link [m], shape (3,).
+        """Return the position of the goal on a resized link [m], shape (..., 3).
 
         Args:
-            scale: How the link is stretched.
+            scale: How the link is stretched, shape (..., 3): of one person or of many.
             covers: What encloses each of its shapes.
-            padding: By how much the padding of the link grows [m].
+            padding: By how much the padding of the link grows [m], shape (...).
         """
         mapped = np.array(scale) * self.surface
-        outward = max(shape.reach(self.normal) for shape in covers[self.shape])
-        beyond = outward - float(self.normal @ mapped)
-        return np.asarray(mapped + (beyond + self.distance + padding) * self.normal)
+        outward = np.max([shape.reach(self.normal) for shape in covers[self.shape]], axis=0)
+        beyond = outward - np.vecdot(mapped, self.normal)
+        distance = np.asarray(beyond + self.distance + padding)
+        return np.asarray(mapped + distance[..., None] * self.normal)

@@ -132,22 +132,25 @@ class PeopleInScene:
         some of his shapes are several of other people."""
         self._anchors = self._read_anchors(task)
 
-    def arrays_for(self, scales: Mapping[str, Scale], states: IntArray) -> SceneArrays:
-        """Return the arrays of some of the states, with a person in them.
+    def arrays_of(
+        self, people: Sequence[Mapping[str, Scale]], states: IntArray
+    ) -> list[SceneArrays]:
+        """Return the arrays of some of the states with a person in them, for each of N people.
 
         They equal the lowering of the resized scene within a micrometre: the model files round
         orientations to seven digits, so that Drake's products of them are rotations to 1e-7 only.
 
         Args:
-            scales: How the parts of the person are stretched, by the keys of `LINKS`
-                of `tcs.model.people`.
-            states: Numbers of the states, shape (s,).
+            people: How the parts of each person are stretched, by the keys of `LINKS` of
+                `tcs.model.people`.
+            states: Numbers of the states of each person, shape (N, s).
         """
-        of_names = scales_by_link(self._environment.person_model, scales)
-        of_links = [of_names[name] for name in self._names]
+        by_part = {part: np.array([one[part] for one in people]) for part in people[0]}
+        of_names = scales_by_link(self._environment.person_model, by_part)
+        of_links = {link: of_names[name] for link, name in zip(_LINKS, self._names, strict=True)}
         covers = {
-            link: covers_of(self._environment, self._names[i], self._shapes[link], of_links[i])
-            for i, link in enumerate(_LINKS)
+            link: covers_of(self._environment, name, self._shapes[link], of_links[link])
+            for link, name in zip(_LINKS, self._names, strict=True)
         }
         stretched = {
             link: list(itertools.chain.from_iterable(found)) for link, found in covers.items()
@@ -155,70 +158,73 @@ class PeopleInScene:
         R, p = self._poses.R[states], self._origins(of_links, stretched, states)
         pads, before = self._paddings(of_names), self._paddings({})
         whole = self._arrays.environment
-        sizes, paddings = whole.size[self.rows], whole.pad[self.rows]
-        turned, centres = whole.R[states][:, self.rows], whole.p[states][:, self.rows]
+        sizes = np.repeat(whole.size[None, self.rows], len(people), axis=0)
+        paddings = np.repeat(whole.pad[None, self.rows], len(people), axis=0)
+        turned, centres = whole.R[states][:, :, self.rows], whole.p[states][:, :, self.rows]
         for part in self._parts:
             link = _LINKS[part.link]
-            shape = stretched[link][part.shape]
-            sizes[part.row, : shape.size.size] = shape.size
-            paddings[part.row] = pads[part.link]
-            centres[:, part.row] = p[:, part.link] + R[:, part.link] @ shape.p_LoSo_L
+            shape, of_man = stretched[link][part.shape], self._shapes[link][part.of_man]
+            sizes[:, part.row, : shape.size.shape[-1]] = shape.size
+            paddings[:, part.row] = pads[part.link]
+            R_link, offset = R[:, :, part.link], shape.p_LoSo_L[:, None]
+            centres[:, :, part.row] = p[:, :, part.link] + np.matvec(R_link, offset)
             # Where the orientation stays, the digits that Drake computed are kept.
-            if shape.R_LS is not self._shapes[link][part.of_man].R_LS:
-                turned[:, part.row] = R[:, part.link] @ shape.R_LS
+            if shape.R_LS is not of_man.R_LS:
+                is_turned = np.any(shape.R_LS != of_man.R_LS, axis=(-2, -1))
+                turned[is_turned, :, part.row] = (R_link @ shape.R_LS[:, None])[is_turned]
         goal_p = self._arrays.goal_p[states]
         for goal, (on, anchor) in self._anchors.items():
-            grown = pads[on] - before[on]
-            position = anchor.position(of_links[on], covers[_LINKS[on]], grown)
-            goal_p[:, goal] = p[:, on] + R[:, on] @ position
-        environment = whole._replace(
-            type=whole.type[self.rows],
-            size=sizes,
-            pad=paddings,
-            body=whole.body[self.rows],
-            frame=whole.frame[self.rows],
-            R=turned,
-            p=centres,
-        )
-        return self._arrays._replace(
-            environment=environment,
+            link = _LINKS[on]
+            position = anchor.position(of_links[link], covers[link], pads[on] - before[on])
+            goal_p[:, :, goal] = p[:, :, on] + np.matvec(R[:, :, on], position[:, None])
+        arrays = self._arrays._replace(
             arm_vs_environment=self._arrays.arm_vs_environment[:, self.rows],
             body_vs_environment=self._arrays.body_vs_environment[:, self.rows],
-            goal_R=self._arrays.goal_R[states],
-            goal_p=goal_p,
         )
+        environment = whole._replace(
+            type=whole.type[self.rows], body=whole.body[self.rows], frame=whole.frame[self.rows]
+        )
+        return [
+            arrays._replace(
+                environment=environment._replace(
+                    size=sizes[number], pad=paddings[number], R=turned[number], p=centres[number]
+                ),
+                goal_R=self._arrays.goal_R[states[number]],
+                goal_p=goal_p[number],
+            )
+            for number in range(len(people))
+        ]
 
-    def _paddings(self, scales: Mapping[str, Scale]) -> list[float]:
+    def _paddings(self, scales: Mapping[str, FloatArray]) -> list[FloatArray]:
         """Return the padding of each link [m]; of the papers' man without scales."""
         return [padding_of(self._environment, name, scales) for name in self._names]
 
     def _origins(
         self,
-        scales: list[Scale],
+        scales: Mapping[str, FloatArray],
         stretched: Mapping[str, list[LinkShape]],
         states: IntArray,
     ) -> FloatArray:
-        """Return the origins of the links of a person in M [m], shape (s, links, 3)."""
-        by_link = dict(zip(_LINKS, scales, strict=True))
-        moved = _moved(self._before, by_link)
+        """Return the origins of the links of N people in M [m], shape (N, s, links, 3)."""
+        moved = _moved(self._before, scales)
         after = {
             link: (R, p + moved[link]) for link, (R, p) in self._before.items() if link in moved
         }
         support = motion_to_support(self._before, self._shapes, after, stretched)
         # The support moves what carries the person.
         R_base = self._at_zero[self._base][0] @ self._before[self._base][0].T
-        at_zero = _moved(self._at_zero, by_link)
-        by_size = np.array([at_zero[link] + R_base @ support for link in _LINKS])
+        at_zero = _moved(self._at_zero, scales)
+        by_size = [at_zero[link] + np.matvec(R_base, support) for link in _LINKS]
         motions: list[FloatArray] = []
         for number, node in enumerate(self._nodes):
-            step = by_size[node.link]
+            turn, step = self._poses.turn[states, number], by_size[node.link]
             if node.above < 0:
-                motions.append(self._poses.turn[states, number] @ step)
+                motions.append(np.matvec(turn, step[:, None]))
                 continue
             step = step - by_size[self._nodes[node.above].link]
-            motions.append(motions[node.above] + self._poses.turn[states, number] @ step)
+            motions.append(motions[node.above] + np.matvec(turn, step[:, None]))
         names = [node.name for node in self._nodes]
-        of_links = np.stack([motions[names.index(link)] for link in _LINKS], axis=1)
+        of_links = np.stack([motions[names.index(link)] for link in _LINKS], axis=2)
         return np.asarray(self._poses.p[states] + of_links)
 
     def _read_poses(
@@ -333,8 +339,8 @@ def _base(carriers: Mapping[str, RigidBody]) -> str:
     return name
 
 
-def _moved(before: Poses, scales: Mapping[str, Scale]) -> dict[str, FloatArray]:
-    """Return how far each link moves from the head outward, in the model frame [m]."""
+def _moved(before: Poses, scales: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Return how far each link moves from the head outward, in the model frame [m], (N, 3)."""
     moved = {ROOT: np.zeros(3)}
     for link, step in steps_of_joints(before, scales).items():
         moved[link] = moved[PARENTS[link]] + step

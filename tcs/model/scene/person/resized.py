@@ -13,8 +13,10 @@ import copy
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
@@ -60,6 +62,7 @@ _ELLIPTIC = ("mid_body", "lower_body", "quad")
 _SAME_FRAME = {"head_link": "head", "head_turn_link": "head", "neck_rotation": "neck"}
 """Links without shapes that move with a part of the person."""
 
+T = TypeVar("T")
 Poses = Mapping[str, tuple[FloatArray, FloatArray]]
 """Orientation and position of links in the model frame, by name."""
 
@@ -89,31 +92,34 @@ def scales_of(environment: EnvironmentFile) -> dict[str, Scale]:
     return scales_by_link(environment.person_model, scales)
 
 
-def scales_by_link(model: str, scales: Mapping[str, Scale]) -> dict[str, Scale]:
+def scales_by_link(model: str, scales: Mapping[str, T]) -> dict[str, T]:
     """Return the scales of the parts of a person by "model::link".
 
     Args:
         model: Name of the model of the person.
-        scales: By the keys of `LINKS` of `tcs.model.people`.
+        scales: By the keys of `LINKS` of `tcs.model.people`, of one person or of many.
     """
     return {f"{model}::{link}": scales[part_of(link)] for link in (ROOT, *PARENTS)}
 
 
-def padding_of(environment: EnvironmentFile, link: str, scales: Mapping[str, Scale]) -> float:
-    """Return the padding of a link [m].
+def padding_of(
+    environment: EnvironmentFile, link: str, scales: Mapping[str, ArrayLike]
+) -> FloatArray:
+    """Return the padding of a link [m], shape (...).
 
     Args:
         environment: The environment.
         link: Name of the link, "model::link".
-        scales: What `scales_of` returns for the environment, {} for the papers' man.
+        scales: What `scales_of` returns for the environment, {} for the papers' man; of one person
+            or of many, shapes (..., 3).
     """
     padding = float(environment.padding.get(link, 0.0))
     scale = scales.get(link)
-    return padding if scale is None else padding_for(padding, scale)
+    return np.asarray(padding) if scale is None else padding_for(padding, scale)
 
 
 def covers_of(
-    environment: EnvironmentFile, link: str, shapes: Sequence[LinkShape], scale: Scale
+    environment: EnvironmentFile, link: str, shapes: Sequence[LinkShape], scale: ArrayLike
 ) -> list[tuple[LinkShape, ...]]:
     """Return for each shape of a link those that enclose it and its skin, stretched.
 
@@ -121,7 +127,7 @@ def covers_of(
         environment: The environment.
         link: Name of the link, "model::link".
         shapes: The shapes of the papers' man.
-        scale: How the link is stretched.
+        scale: How the link is stretched, shape (..., 3): of one person or of many.
     """
     padding = float(environment.padding.get(link, 0.0))
     numbers = numbers_of_parts(link, shapes)
@@ -247,21 +253,21 @@ def _move_joints(
             write_position(pose, read_pose(pose)[1] + before[over][0].T @ moved[name])
 
 
-def steps_of_joints(before: Poses, scales: Mapping[str, Scale]) -> dict[str, FloatArray]:
+def steps_of_joints(before: Poses, scales: Mapping[str, ArrayLike]) -> dict[str, FloatArray]:
     """Return how far each link moves relative to its parent, in the model frame [m].
 
     Args:
         before: Poses of the links before resizing.
-        scales: How each link is stretched, by its name.
+        scales: How each link is stretched, by its name, shapes (..., 3): of one person or of many.
 
     Returns:
-        By the keys of `PARENTS`, in their order, shapes (3,).
+        By the keys of `PARENTS`, in their order, shapes (..., 3).
     """
     steps = {}
     for name, parent in PARENTS.items():
         R, p = before[parent]
         offset = R.T @ (before[name][1] - p)
-        steps[name] = R @ ((np.array(scales[parent]) - 1.0) * offset)
+        steps[name] = np.matvec(R, (np.asarray(scales[parent]) - 1.0) * offset)
     return steps
 
 
@@ -271,22 +277,32 @@ def motion_to_support(
     after: Poses,
     resized: Mapping[str, list[LinkShape]],
 ) -> FloatArray:
-    """Return the motion that puts the resized person on the seat or on the mattress [m]."""
+    """Return the motion that puts the resized person on the seat or on the mattress [m].
+
+    Args:
+        before: Poses of the links of the papers' man.
+        shapes: His shapes.
+        after: Poses of those of one person or of many, positions of shapes (..., 3).
+        resized: Their shapes.
+
+    Returns:
+        Shape (..., 3).
+    """
     trunk = [f"{part}_link" for part in _TRUNK]
     thighs = ["quad_left_link", "quad_right_link"]
     R, _ = before["upper_body_link"]
     is_upright = abs(R[2, 0]) > 0.7
     support = thighs if is_upright else trunk
-    rise = _least(before, shapes, support)[2] - _least(after, resized, support)[2]
+    rise = _least(before, shapes, support)[2] - _least(after, resized, support)[..., 2]
     if is_upright:
-        forward = _least(before, shapes, trunk)[0] - _least(after, resized, trunk)[0]
+        forward = _least(before, shapes, trunk)[0] - _least(after, resized, trunk)[..., 0]
     else:
-        forward = before["lower_body_link"][1][0] - after["lower_body_link"][1][0]
-    return np.array([forward, 0.0, rise])
+        forward = before["lower_body_link"][1][0] - after["lower_body_link"][1][..., 0]
+    return np.stack([forward, np.zeros_like(rise), rise], axis=-1)
 
 
 def _least(poses: Poses, shapes: Mapping[str, list[LinkShape]], links: list[str]) -> FloatArray:
-    """Return the least x, y and z of the shapes of some links [m], shape (3,)."""
+    """Return the least x, y and z of the shapes of some links [m], shape (..., 3)."""
     corners = [shape.extent(*poses[link])[0] for link in links for shape in shapes[link]]
     return np.asarray(np.min(corners, axis=0))
 

@@ -16,7 +16,10 @@ from tcs.kernel.arrays import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class LinkShape:
-    """A box or a capsule on a link L, with a frame S at its centre."""
+    """A box or a capsule on a link L, with a frame S at its centre.
+
+    Leading axes of the arrays count people; `nearest` is of one.
+    """
 
     is_box: bool
     size: FloatArray
@@ -52,22 +55,22 @@ class LinkShape:
         surface[axis] = normal[axis] * self.size[axis]
         return -float(depth[axis]), surface, normal
 
-    def reach(self, direction: FloatArray) -> float:
+    def reach(self, direction: FloatArray) -> FloatArray:
         """Return how far the shape extends from the origin of L along a unit vector in L [m]."""
-        across = direction @ self.R_LS
+        across = np.abs(np.vecmat(direction, self.R_LS))
         if self.is_box:
-            half = float(np.abs(across) @ self.size)
+            half = np.vecdot(across, self.size)
         else:
-            half = float(self.size[0] + abs(across[2]) * self.size[1])
-        return float(direction @ self.p_LoSo_L) + half
+            half = self.size[..., 0] + across[..., 2] * self.size[..., 1]
+        return np.asarray(np.vecdot(direction, self.p_LoSo_L) + half)
 
     def extent(self, R: FloatArray, p: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the corners of the bounding box with the link at a pose R, p, each shape (3,)."""
-        centre, R_S = p + R @ self.p_LoSo_L, R @ self.R_LS
+        """Return the corners of the bounding box with the link at a pose R, p, each (..., 3)."""
+        centre, R_S = p + np.matvec(R, self.p_LoSo_L), np.abs(R @ self.R_LS)
         if self.is_box:
-            reach = np.abs(R_S) @ self.size
+            reach = np.matvec(R_S, self.size)
         else:
-            reach = np.abs(R_S[:, 2]) * self.size[1] + self.size[0]
+            reach = R_S[..., :, 2] * self.size[..., 1, None] + self.size[..., 0, None]
         return centre - reach, centre + reach
 
 
