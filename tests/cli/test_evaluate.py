@@ -176,7 +176,7 @@ def test_an_interrupt_ends_in_one_line_and_leaves_the_file(stored, tmp_path):
     path.write_bytes(stored.read_bytes())
     words = [sys.executable, "-m", "tcs", "robustify", str(path), "--samples", "100000"]
     running = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    time.sleep(6.0)
+    time.sleep(4.0)
     running.send_signal(signal.SIGINT)
     out, err = running.communicate(timeout=60)
     assert (running.returncode, out) == (130, "")

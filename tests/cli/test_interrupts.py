@@ -161,7 +161,9 @@ class Loading:
     def find_spec(self, name, *_):
         if name == "tcs.cli.view":
             create_module()
-            time.sleep(5.0)
+            # Only between two steps of Python does the main thread see the signal.
+            for _ in range(500):
+                time.sleep(0.01)
 sys.meta_path.insert(0, Loading())
 """
     ran = process("list", before=before)

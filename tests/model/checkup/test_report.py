@@ -1,5 +1,6 @@
 """The check-up: results for a sound robot, and that every type of problem is found."""
 
+import importlib
 import json
 
 import numpy as np
@@ -7,8 +8,27 @@ import pytest
 
 from tcs.model.checkup import check_up
 from tcs.model.robots import load_robot
+from tcs.model.robots.fitting.enclosure import _body_enclosure
 from tcs.model.robots.primitives import read_primitives, write_primitives
 from tests.model.robots.shipped import all_robots
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _bodies_are_judged_once():
+    """Share the enclosure of a body between robots with the same shapes and surface of it."""
+    judged = {}
+
+    def shared(body, members, shapes, surface):
+        key = body, members, shapes, surface.tobytes()
+        if key not in judged:
+            judged[key] = _body_enclosure(body, members, shapes, surface)
+        return judged[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        # The package has a function of the module's name.
+        enclosure = importlib.import_module("tcs.model.robots.fitting.enclosure")
+        patch.setattr(enclosure, "_body_enclosure", shared)
+        yield
 
 
 @pytest.fixture(scope="module", params=all_robots())
