@@ -9,10 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tcs.errors import TcsError
-from tcs.kernel.approach.scene import approach_scene
+from tcs.kernel.approach.scene import LineScene, approach_scene
 from tcs.kernel.approach.sweep import ApproachLines, approach_spline
 from tcs.kernel.arrays import FloatArray
-from tcs.kernel.motion.scene import MotionScene
 from tcs.kernel.problem import Problem, build_problem
 from tcs.model.scene import NeighbourList, Scene, goal_poses
 from tcs.motion.curves import Curve
@@ -81,7 +80,7 @@ class ApproachScene:
     problem: Problem
     lines: ApproachLines
     neighbours: NeighbourList
-    around: MotionScene
+    around: LineScene
     """The scene of the certified checks."""
 
     @classmethod

@@ -16,6 +16,7 @@ from tcs.kernel.motion.idle import needed_pairs
 from tcs.kernel.motion.scene import (
     MotionScene,
     MotionWorkspace,
+    carriers,
     new_motion_workspace,
     placed,
     torso_scene,
@@ -139,12 +140,13 @@ class StopGrid:
         """
         every, robot = torso_scene(self.problem, torso), self.problem.environment_bodies
         kept, other = needed_pairs(every, robot), every.body[every.pair[:, 1]]
-        paths = grouped(with_pairs(every, kept))
+        of_fixed = carriers(self.problem)
+        paths = grouped(with_pairs(every, kept), of_fixed)
         if not self.job.task.keep_out:
             return paths, paths
         # The boxes are the last bodies of the environment.
         outside = (other < robot - len(self.job.task.keep_out)) | (other >= robot)
-        return paths, grouped(with_pairs(every, kept & outside))
+        return paths, grouped(with_pairs(every, kept & outside), of_fixed)
 
 
 @dataclass(frozen=True, eq=False)

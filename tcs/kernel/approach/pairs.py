@@ -31,7 +31,7 @@ from tcs.kernel.approach.grid import (
     place_levels,
     take_path,
 )
-from tcs.kernel.approach.scene import pair_contact_code
+from tcs.kernel.approach.scene import LineScene, pair_contact_code
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner
 from tcs.kernel.contacts import (
@@ -80,6 +80,8 @@ class Approach(NamedTuple):
     search: Search
     grid: LineGrid
     scene: MotionScene
+    boxes: FloatArray
+    """As in `LineScene`."""
     motion: MotionWorkspace
     curve: CurveWorkspace
     offset: FloatArray
@@ -92,14 +94,15 @@ class Approach(NamedTuple):
     """First contact that blocked a motion, as a code, shape (1,)."""
 
 
-def new_approach(problem: Problem, scene: MotionScene) -> Approach:
+def new_approach(problem: Problem, lines: LineScene) -> Approach:
     """Return the memory of one worker, given the `approach_scene` of the problem."""
-    scene = scene._replace(centre=scene.centre.copy())
+    scene = lines.motion._replace(centre=lines.motion.centre.copy())
     return Approach(
         new_workspace(problem),
         new_search(),
         new_grid(),
         scene,
+        lines.boxes,
         new_motion_workspace(scene),
         new_curve(),
         np.empty(3),

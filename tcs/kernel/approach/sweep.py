@@ -8,13 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.kernel.approach.pairs import Approach, approach_pair, follow_posture, new_approach
-from tcs.kernel.approach.scene import approach_scene, place_scene
+from tcs.kernel.approach.scene import LineScene, approach_scene, place_scene
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.base_pose import environment_in_arm_base, goal_in_arm_base, place_base
 from tcs.kernel.cache import inner, jit
 from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.dexterity.measures import measure_at, rounded_inward
-from tcs.kernel.motion.scene import MotionScene
 from tcs.kernel.motion.straight import DONE
 from tcs.kernel.problem import Problem
 from tcs.kernel.scores import APPROACH_BLOCKED, REACHED
@@ -47,7 +46,7 @@ class ReachedPairs(NamedTuple):
 
 
 def score_approaches(
-    problem: Problem, lines: ApproachLines, pairs: ReachedPairs, scene: MotionScene | None = None
+    problem: Problem, lines: ApproachLines, pairs: ReachedPairs, scene: LineScene | None = None
 ) -> None:
     """Replace the scores of reached pairs by those with approach.
 
@@ -70,7 +69,7 @@ def approach_spline(
     configuration: int,
     goal: int,
     q: FloatArray,
-    scene: MotionScene | None = None,
+    scene: LineScene | None = None,
 ) -> tuple[FloatArray, FloatArray] | None:
     """Return the approach of a posture as a spline in joint space, None if none is found.
 
@@ -118,7 +117,7 @@ def _follow_posture(
 def _place_surroundings(problem: Problem, approach: Approach, torso: int) -> None:
     """Place everything around the arm, the base being in place."""
     environment_in_arm_base(problem, approach.work, torso)
-    place_scene(problem, approach.work, torso, approach.scene, approach.motion)
+    place_scene(problem, approach.work, torso, approach.scene, approach.boxes, approach.motion)
     approach.columns[5] = torso
 
 

@@ -1,7 +1,8 @@
-"""Boxes around groups of shapes of a link, and the tree of pairs that they make.
+"""Boxes around groups of shapes, and the tree of pairs that they make.
 
 A link of many shapes gets a binary tree of boxes in its frame: the root encloses all its shapes,
-and two boxes below each box one body and the others, or one half of its shapes each. The pairs that
+and two boxes below each box one body and the others, or one half of its shapes each. So do fixed
+shapes that never move relative to each other, such as those of the robot's base. The pairs that
 are checked always are those of the roots. Below a pair are the two pairs of what is below the
 larger one of its boxes with the other one, down to the pairs of shapes: these are the pairs of the
 scene without groups, and they alone can be in contact.
@@ -25,12 +26,12 @@ NONE = -1
 
 
 class Groups(NamedTuple):
-    """The arm's shapes and the boxes around groups of them."""
+    """Shapes and the boxes around groups of them."""
 
     rows: FloatArray
-    """Shapes, then boxes, packed, in link frames, shape (n, 17)."""
+    """Shapes, then boxes, packed, in the frames of what carries them, shape (n, 17)."""
     frame: IntArray
-    """Link of each, shape (n,)."""
+    """What carries each, shape (n,): shapes that it carries never move relative to each other."""
     parts: IntArray
     """The two shapes or boxes in each box, NONE for shapes, shape (n, 2)."""
     roots: IntArray
@@ -48,43 +49,64 @@ class _Level(NamedTuple):
     """Whether there are two pairs below, shape (n,): two by two, these are the next level."""
 
 
-def grouped(scene: MotionScene) -> MotionScene:
+def grouped(scene: MotionScene, carrier: IntArray | None = None) -> MotionScene:
     """Return a scene whose pairs are checked by groups; only pairs of shapes can be in contact.
 
     Args:
-        scene: A scene without groups. It is returned unchanged if no link has many shapes.
+        scene: A scene without groups. It is returned unchanged if there are no groups.
+        carrier: Number of what carries each fixed shape, NONE for shapes that are not grouped,
+            shape (n_fixed,); None to group none. Boxes come after the fixed shapes.
     """
-    groups = boxes_around(scene.links, scene.link_frame, scene.body[: len(scene.links)])
-    count, added = len(scene.links), len(groups.rows) - len(scene.links)
-    if added == 0:
+    count, shapes = len(scene.links), len(scene.fixed)
+    arm = boxes_around(scene.links, scene.link_frame, scene.body[:count])
+    carrier = np.full(shapes, NONE) if carrier is None else carrier
+    around = boxes_around(scene.fixed, carrier, scene.body[count:])
+    added = len(arm.rows) - count
+    if added == 0 and len(around.rows) == shapes:
         return scene
-    levels = _levels(groups, scene.fixed)
+    levels = _levels(arm, around)
     pairs = scene.pair + added * np.array([0, 1, 0]) * (scene.pair[:, 1:2] >= count)
-    gaps = _gaps(levels, pairs, scene.gap, (len(groups.rows), len(groups.rows) + len(scene.fixed)))
+    gaps = _gaps(levels, pairs, scene.gap, (len(arm.rows), len(arm.rows) + len(around.rows)))
     kept = [gap > 0.0 for gap in gaps]
     first = np.concatenate([level.first[keep] for level, keep in zip(levels, kept, strict=True)])
     second = np.concatenate([level.second[keep] for level, keep in zip(levels, kept, strict=True)])
-    frame = np.concatenate([groups.frame, np.zeros(len(scene.fixed), np.int64)])
+    frame = np.concatenate([arm.frame, np.zeros(len(around.rows), np.int64)])
     fields = pair_fields(
-        groups.rows,
-        scene.fixed,
+        arm.rows,
+        around.rows,
         np.stack([first, second, frame[second]], axis=1),
         np.concatenate([gap[keep] for gap, keep in zip(gaps, kept, strict=True)]),
         _below(levels, kept),
         int(kept[0].sum()),
     )
-    # The body of a box is never asked for: it is that of some shape of its link.
-    of_boxes = scene.body[[np.argmax(scene.link_frame == f) for f in groups.frame[count:]]]
-    body = np.concatenate([scene.body[:count], of_boxes, scene.body[count:]])
-    return scene._replace(links=groups.rows, link_frame=groups.frame, body=body, **fields)
+    bodies = (_bodies(arm, scene.body[:count]), _bodies(around, scene.body[count:]))
+    return scene._replace(
+        links=arm.rows,
+        link_frame=arm.frame,
+        fixed=around.rows,
+        body=np.concatenate(bodies),
+        **fields,
+    )
+
+
+def _bodies(groups: Groups, body: IntArray) -> IntArray:
+    """Return the body of each shape and, for boxes, that of a shape with the same carrier.
+
+    Args:
+        groups: Shapes and boxes.
+        body: Body of each shape.
+    """
+    frames = groups.frame[: len(body)]
+    of_boxes = [int(np.argmax(frames == f)) for f in groups.frame[len(body) :]]
+    return np.concatenate([body, body[np.array(of_boxes, np.int64)]])
 
 
 def boxes_around(links: FloatArray, link_frame: IntArray, body: IntArray) -> Groups:
-    """Return the boxes around groups of the shapes of each link that has many.
+    """Return the boxes around groups of the shapes of each link, or other carrier, that has many.
 
     Args:
         links: Shapes, packed, in link frames, shape (n, 17).
-        link_frame: Link of each, shape (n,).
+        link_frame: Link of each, shape (n,); NONE for shapes that are not grouped.
         body: Body of each, shape (n,): bodies that are fixed to each other are on one link.
     """
     half = _extents(links)
@@ -115,7 +137,8 @@ def boxes_around(links: FloatArray, link_frame: IntArray, body: IntArray) -> Gro
     roots: list[int] = []
     for frame in np.unique(link_frame):
         members = np.flatnonzero(link_frame == frame)
-        roots += [box(members, int(frame))] if len(members) > LEAST else members.tolist()
+        alone = frame == NONE or len(members) <= LEAST
+        roots += members.tolist() if alone else [box(members, int(frame))]
     rows = _boxes(np.array(corners).reshape(-1, 6))
     shapes = np.full((len(links), 2), NONE)
     return Groups(
@@ -147,14 +170,15 @@ def _boxes(corners: FloatArray) -> FloatArray:
     return rows
 
 
-def _levels(groups: Groups, fixed: FloatArray) -> list[_Level]:
+def _levels(arm: Groups, around: Groups) -> list[_Level]:
     """Return the tree of all pairs on different links or with fixed shapes, level by level."""
-    bound = np.concatenate([groups.rows[:, BOUND], fixed[:, BOUND]])
-    parts = np.concatenate([groups.parts, np.full((len(fixed), 2), NONE)])
-    roots = np.sort(groups.roots)
-    others = np.concatenate([len(groups.rows) + np.arange(len(fixed)), roots])
+    count = len(arm.rows)
+    bound = np.concatenate([arm.rows[:, BOUND], around.rows[:, BOUND]])
+    parts = np.concatenate([arm.parts, np.where(around.parts == NONE, NONE, count + around.parts)])
+    roots = np.sort(arm.roots)
+    others = np.concatenate([count + np.sort(around.roots), roots])
     first, second = (part.ravel() for part in np.meshgrid(roots, others, indexing="ij"))
-    frame = np.concatenate([groups.frame, np.zeros(len(fixed), groups.frame.dtype)])
+    frame = np.concatenate([arm.frame, np.zeros(len(around.rows), arm.frame.dtype)])
     apart = frame[first] > frame[second]
     first, second = first[apart], second[apart]
     levels: list[_Level] = []

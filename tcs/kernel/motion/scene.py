@@ -44,7 +44,8 @@ class MotionScene(NamedTuple):
     link_frame: IntArray
     """Link of each shape in `links`, 1 .. 7, shape (n_arm,)."""
     fixed: FloatArray
-    """Environment and rest of the robot, packed, in A, shape (n_fixed, 17)."""
+    """Environment and rest of the robot, and boxes around groups of the latter, packed, in A, shape
+    (n_fixed, 17)."""
     pair: IntArray
     """Checked pairs: shape of the arm, other shape, and link that carries the other shape, 0 if it
     is fixed; shape (n_pairs, 3). The other link is the one nearer to the base."""
@@ -208,10 +209,18 @@ def placed(scene: MotionScene, problem: Problem, configuration: int) -> MotionSc
     p_WB = np.array([problem.base_x[x], problem.base_y[y], 0.0])
     R_WA = R_WB @ problem.base_R[torso]
     p_WA = p_WB + R_WB @ problem.base_p[torso]
-    environment = _moved(problem.environment[state], R_WA.T, -R_WA.T @ p_WA)
+    environment = moved_shapes(problem.environment[state], R_WA.T, -R_WA.T @ p_WA)
     fixed = np.concatenate([environment, scene.fixed[len(environment) :]])
     always = scene.pair[: scene.first_pair[-1]]
     return scene._replace(fixed=fixed, centre=_centres(always, len(scene.links), fixed))
+
+
+def carriers(problem: Problem) -> IntArray:
+    """Return what carries each fixed shape of a scene, shape (n_fixed,), as `groups` takes it.
+
+    Shapes of the environment are grouped with no others, those of the robot by their mount.
+    """
+    return np.concatenate([np.full(problem.environment_body.size, -1), problem.body_mount])
 
 
 def with_pairs(scene: MotionScene, kept: BoolArray) -> MotionScene:
@@ -289,7 +298,7 @@ def new_motion_workspace(scene: MotionScene) -> MotionWorkspace:
     )
 
 
-def _moved(rows: FloatArray, R: FloatArray, p: FloatArray) -> FloatArray:
+def moved_shapes(rows: FloatArray, R: FloatArray, p: FloatArray) -> FloatArray:
     """Return packed shapes moved by the pose (R, p)."""
     moved = rows.copy()
     moved[:, CENTRE : CENTRE + 3] = rows[:, CENTRE : CENTRE + 3] @ R.T + p

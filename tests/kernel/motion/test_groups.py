@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tcs.kernel.approach.scene import approach_scene
 from tcs.kernel.arrays import BOX, CAPSULE
 from tcs.kernel.collide import BOUND, CENTRE, ROTATION, SIZE, TYPE
 from tcs.kernel.motion.edges import NO_PAIR, certified, posture_contact
 from tcs.kernel.motion.groups import NONE, boxes_around, grouped
 from tcs.kernel.motion.idle import without_idle_pairs
 from tcs.kernel.motion.scene import (
+    carriers,
     motion_scene,
     new_motion_workspace,
     placed,
@@ -145,6 +147,62 @@ def test_a_scene_is_placed_at_every_configuration(many, chain, rng):
                 assert (posture_contact(scene, work, q) != NO_PAIR) == touches
                 judged.append(touches)
     assert 5 < sum(judged) < len(judged) - 5
+
+
+def shapes_in(scene, box):
+    """Return the shapes of the arm or around it that are in a box around fixed shapes."""
+    below = [k for k in np.flatnonzero(scene.pair[:, 1] == box) if np.ptp(scene.below[k]) > 0]
+    members = []
+    while below:
+        k = below.pop()
+        below += range(*scene.below[k])
+        members += [] if np.ptp(scene.below[k]) else [int(scene.pair[k, 1])]
+    return set(members)
+
+
+def test_shapes_of_the_base_are_in_boxes_at_every_torso_level(many, chain, rng):
+    # Copies of a shape stay together: the shapes of a body are contiguous.
+    which = np.repeat(np.arange(len(many.body.type)), 2 * COPIES)
+    body = many.body._replace(
+        type=many.body.type[which],
+        size=0.3 * many.body.size[which],
+        pad=many.body.pad[which],
+        body=many.body.body[which],
+        frame=many.body.frame[which],
+        R=many.body.R[:, which],
+        p=many.body.p[:, which] + rng.normal(scale=0.1, size=(1, len(which), 3)),
+    )
+    scene = many._replace(
+        body=body,
+        arm_vs_body=many.arm_vs_body[:, which],
+        body_vs_environment=many.body_vs_environment[which],
+    )
+    problem = build_problem(scene, toy_grid())
+    lines = approach_scene(problem)
+    first = len(lines.motion.links) + len(lines.motion.fixed) - lines.boxes.shape[1]
+    assert lines.boxes.shape[1] > 0
+    assert problem.torso_levels > 1
+    shift = len(lines.motion.links) + problem.environment_body.size
+    for n in range(lines.boxes.shape[1]):
+        members = [i - shift for i in shapes_in(lines.motion, first + n)]
+        assert members
+        for torso in range(problem.torso_levels):
+            box = lines.boxes[torso, n]
+            for row in problem.body_A[torso, members]:
+                beyond = (extremes(row) - box[CENTRE : CENTRE + 3]) @ box[ROTATION:].reshape(3, 3)
+                assert np.all(np.abs(beyond) <= box[SIZE : SIZE + 3])
+    for torso in range(problem.torso_levels):
+        plain = torso_scene(problem, torso)
+        of_base = placed(grouped(plain, carriers(problem)), problem, torso)
+        plain = placed(plain, problem, torso)
+        works = new_motion_workspace(of_base), new_motion_workspace(plain)
+        for _ in range(40):
+            q = within_limits(rng, chain)
+            found = [
+                posture_contact(one, work, q) != NO_PAIR
+                for one, work in zip((of_base, plain), works, strict=True)
+            ]
+            assert found[0] == found[1]
 
 
 def test_an_arm_of_few_shapes_is_left_as_it_is(chain):
