@@ -124,7 +124,7 @@ def measured(client: Client, asked: Asked, requests: int, pid: int) -> int:
 
 def found(client: Client, asked: Asked) -> bool:
     """Return whether the node answers and holds the file."""
-    answer = client._session.liveliness().get("@ros2_lv/0/**/NN/**", timeout=1.0)
+    answer = client.session.liveliness().get("@ros2_lv/0/**/NN/**", timeout=1.0)
     return (
         any(True for _ in answer) and client.call("tcs/select", asked.body().decode()) is not None
     )
