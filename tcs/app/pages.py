@@ -12,7 +12,16 @@ LANGUAGES = ("en", "de")
 """Languages of the page; the texts of each are in one file."""
 _TYPES = {".js": "text/javascript", ".css": "text/css", ".json": "application/json"}
 _NAMES = (
-    *("api.js", "editing.js", "main.js", "map.js", "panels.js", "playing.js", "solids.js"),
+    *(
+        "api.js",
+        "editing.js",
+        "main.js",
+        "map.js",
+        "marks.js",
+        "panels.js",
+        "playing.js",
+        "solids.js",
+    ),
     *("texts.js", "things.js", "view3d.js", "style.css"),
     *(f"{language}.json" for language in LANGUAGES),
 )

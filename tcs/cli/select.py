@@ -105,6 +105,7 @@ def select(
     """Select the set with the greatest utility from the current state."""
     import tcs
     from tcs.cli.values import current_state, frame_values, observed_settings
+    from tcs.output.words import choice_in_words
     from tcs.placement.constraints import scored_entries
     from tcs.placement.selection import Executability, same_set
     from tcs.placement.store import motions_of
@@ -135,7 +136,7 @@ def select(
     choice = choose(here, motions=motions)
     for warning in choice.warnings:
         terminal.note(warning)
-    result = choice.to_json(loaded.metadata["measure"])
+    result = choice_in_words(loaded, choice)
     if motions is not None:
         compared = Executability.of(loaded, motions, choice, choose(here))
         result["executable"] = compared.to_json(choice)
@@ -200,6 +201,7 @@ def explain(
     from tcs.cli.values import current_state, frame_values, observed_settings
     from tcs.model.grid import Grid
     from tcs.output.terminal.explanations import report_explanation
+    from tcs.output.words import explanation_in_words
     from tcs.placement.reasons import fix_weights
 
     loaded = tcs.load(file)
@@ -220,5 +222,5 @@ def explain(
         observed=observed_settings(observed or (), loaded.observed_axes),
         frames=frame_values(frames or ()),
     )
-    result = {**explanation.to_json(), "measure": loaded.metadata["measure"]}
+    result = explanation_in_words(loaded, explanation)
     terminal.print_result(result, report_explanation, as_json=as_json)

@@ -13,6 +13,7 @@ from tcs.files.documents import checked
 from tcs.files.json_values import without_infinities
 from tcs.files.writing import scratch_folder
 from tcs.model.catalogue import catalogue
+from tcs.output.words import choice_in_words, explanation_in_words
 from tcs.placement.constraints import scored_entries
 from tcs.placement.reasons import explain, fix_weights
 from tcs.placement.selection import Executability, Top, select
@@ -195,7 +196,7 @@ class Engine:
                 frames=request.frames,
             )
             choice = choose(motions=motions)
-            result = {**choice.to_json(file.metadata["measure"]), **scored_entries(file)}
+            result = {**choice_in_words(file, choice), **scored_entries(file)}
             if motions is not None:
                 compared = Executability.of(file, motions, choice, choose())
                 result["executable"] = compared.to_json(choice)
@@ -232,7 +233,7 @@ class Engine:
                 observed=observed_of(request.observed, file.observed_axes),
                 frames=request.frames,
             )
-            result = {**explanation.to_json(), "measure": file.metadata["measure"]}
+            result = explanation_in_words(file, explanation)
         return dict(without_infinities(result))
 
     def floor(self, request: FloorRequest) -> dict[str, Any]:

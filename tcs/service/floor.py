@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,10 +11,11 @@ import numpy as np
 from tcs.model.grid import Grid, InitialConfiguration
 from tcs.output.words import (
     REASON_TEXTS,
-    frame_name,
     frames_of_state,
+    goal_names,
     pair_text,
     relative_place,
+    text_of_goal,
 )
 from tcs.placement.reasons import nearest_configuration
 from tcs.placement.store import ScoreFile
@@ -146,34 +146,19 @@ def _goal(file: ScoreFile, scores: ScoreTable, rows: Any, goal: int) -> dict[str
     number = int(scores.pair[row, goal])
     pair = scores.pair_names[number] if number >= 0 else None
     contact = f" ({pair_text(pair)})" if pair is not None else ""
-    given, frame = _text_of(file.task, goal, "name"), _frame_of(file.task, goal)
-    place = sum(_frame_of(file.task, other) == frame for other in range(goal + 1))
+    frames = [text_of_goal(file.task, other, "body_frame") for other in range(goal + 1)]
     return {
         "goal": goal,
-        "name": given or (f"{frame_name(frame)}, place {place}" if frame else f"goal {goal}"),
-        "given_name": given,
-        "body_frame": frame,
-        "place": place,
+        "name": goal_names(file.task, goal + 1)[goal] or f"goal {goal}",
+        "given_name": text_of_goal(file.task, goal, "name"),
+        "body_frame": frames[goal],
+        "place": frames.count(frames[goal]),
         "reached": reason == Reason.REACHED,
         "reason": reason.name.lower(),
         "words": f"{REASON_TEXTS[reason]}{contact}",
         "pair": None if pair is None else list(pair),
         "dexterity": float(scores.dexterity[row, goal]),
     }
-
-
-def _frame_of(task: Mapping[str, Any], goal: int) -> str | None:
-    """Return the body frame of a goal, None if the file does not state it."""
-    return _text_of(task, goal, "body_frame")
-
-
-def _text_of(task: Mapping[str, Any], goal: int, key: str) -> str | None:
-    """Return a text of a goal, None if the file does not state it."""
-    goals = task.get("goals")
-    if not isinstance(goals, Sequence) or goal >= len(goals) or not isinstance(goals[goal], dict):
-        return None
-    text = goals[goal].get(key)
-    return text if isinstance(text, str) and text else None
 
 
 def _states(grid: Grid) -> int:

@@ -3,7 +3,7 @@ import re
 import pytest
 
 import tcs
-from tcs.output.words import pair_text
+from tcs.output.words import explanation_in_words, pair_text
 from tcs.placement.reasons import fix_weights
 from tcs.placement.tables import Reason
 from tests.placement.store.example import SHIFT, score_file
@@ -25,7 +25,7 @@ def test_json_is_what_python_returns(tcs_command, stored):
     ran = tcs_command("explain", stored, "--goal", 2, "--configuration", 17, "--json")
     assert (ran.code, ran.err) == (0, "")
     file = tcs.load(stored)
-    expected = {**tcs.explain(file, 2, 17).to_json(), "measure": file.metadata["measure"]}
+    expected = explanation_in_words(file, tcs.explain(file, 2, 17))
     assert ran.json == expected
     assert {"reasons", "blocking_pairs", "nearest_reaching"} <= set(ran.json)
     assert {"members", "changes"} <= set(ran.json["nearest_reaching"])

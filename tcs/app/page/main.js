@@ -4,7 +4,7 @@ import { Refusal, cancel, ended, get, post, send } from "./api.js";
 import { Editing, thingName } from "./editing.js";
 import { FloorMap, paint } from "./map.js";
 import { by, made, options, showCards, showExpert, showGoals, showLegend, showStates, showWhy } from "./panels.js";
-import { goalName, load, sentence, t } from "./texts.js";
+import { goalText, load, sentence, t } from "./texts.js";
 import { Things, overlap, turned } from "./things.js";
 import { Playing } from "./playing.js";
 import { View3d } from "./view3d.js";
@@ -244,7 +244,7 @@ function marks() {
   const person = sceneNow()?.things.find((one) => one.category === "person")?.name;
   const positions = (stateNow()?.goals ?? []).map((at) => (things.find(person) ? things.moved(person, at) : at));
   const goals = page.outcome?.goals ?? [];
-  map.marks(positions.map((position, i) => ({ at: position, number: i + 1, reached: goals[i]?.reached })));
+  map.marks(positions.map((position, i) => ({ at: position, number: i, reached: goals[i]?.reached })));
 }
 
 // Says what the base is under, e.g. the bed.
@@ -338,7 +338,7 @@ function show(outcome) {
   by("yaw").value = yaw.toFixed(1);
   by("torso").value = floor().torsos.reduce((a, b) => (Math.abs(b - page.torso) < Math.abs(a - page.torso) ? b : a));
   showGoals(outcome, (goal) => why(goal).catch(fault), (goal) => fixOf(goal).catch(fault));
-  const goals = outcome.goals.filter((goal) => goal.reached).map((goal) => [String(goal.goal), `${goal.goal + 1}. ${goalName(goal)}`]);
+  const goals = outcome.goals.filter((goal) => goal.reached).map((goal) => [String(goal.goal), goalText(goal)]);
   options(by("armAt"), [["", t("bestGoal")], ...goals], by("armAt").value);
   showExpert(outcome, command());
   marks();

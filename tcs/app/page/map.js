@@ -1,5 +1,7 @@
 // The map of the floor: scores as colours, furniture and person to scale, the robot to drag and turn.
 
+import { MARKS, grouped } from "./marks.js";
+
 const SVG = "http://www.w3.org/2000/svg";
 const SCALE = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]]; // viridis
 const COLOURS = { person: "#e3a57f", furniture: "#7b8794", blocked: [196, 202, 209], added: "#8a7350", region: "#b3003b" };
@@ -135,13 +137,12 @@ export class FloorMap {
   // Goals as numbered marks: a disc where reached, a square where not.
   marks(goals) {
     this.goals.replaceChildren();
-    for (const { at, number, reached } of goals) {
-      const fill = reached ? "#00613f" : "#a3210f";
+    for (const { at, text, reached, count } of grouped(goals, 0.06)) {
       const [x, y] = [at[0], -at[1]];
-      const outline = { fill, stroke: "#fff", "stroke-width": 0.012 };
-      if (reached) element("circle", { cx: x, cy: y, r: 0.055, ...outline }, this.goals);
-      else element("rect", { x: x - 0.05, y: y - 0.05, width: 0.1, height: 0.1, ...outline }, this.goals);
-      element("text", { x, y: y + 0.026, "font-size": 0.075, "text-anchor": "middle", fill: "#fff" }, this.goals, number);
+      const half = 0.05 + 0.05 * (count - 1);
+      const outline = { fill: reached ? MARKS.reached : MARKS.unreached, stroke: "#fff", "stroke-width": 0.012 };
+      element("rect", { x: x - half, y: y - 0.05, width: 2 * half, height: 0.1, rx: reached ? 0.05 : 0, ...outline }, this.goals);
+      element("text", { x, y: y + 0.026, "font-size": 0.075, "text-anchor": "middle", fill: "#fff" }, this.goals, text);
     }
   }
 

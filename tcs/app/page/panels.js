@@ -1,6 +1,6 @@
 // The answer beside the map: goals, explanations, suggested places, and the details for experts.
 
-import { changes, goalName, named, setting, t } from "./texts.js";
+import { changes, goalName, goalText, named, setting, t } from "./texts.js";
 
 export const by = (id) => document.getElementById(id);
 
@@ -24,7 +24,7 @@ export function showGoals(outcome, onWhy, onFix) {
   for (const goal of outcome.goals) {
     const item = made("li", undefined, list);
     made("span", goal.reached ? "✓" : "✗", item, { class: `mark ${goal.reached ? "yes" : "no"}`, "aria-hidden": "true" });
-    const name = made("span", `${goal.goal + 1}. ${goalName(goal)}`, item, { class: "name" });
+    const name = made("span", goalText(goal), item, { class: "name" });
     made("span", t(`reasons.${goal.reason}`), name, { class: "reason" });
     if (goal.reached) continue;
     const about = { goal: goalName(goal) };

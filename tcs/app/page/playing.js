@@ -2,7 +2,7 @@
 
 import { cancel, ended, post } from "./api.js";
 import { by, made } from "./panels.js";
-import { goalName, t } from "./texts.js";
+import { goalName, goalText, t } from "./texts.js";
 
 const RATE = 15; // frames per second that are fetched; the browser holds each until the next
 const MOST = 600; // most frames
@@ -95,7 +95,7 @@ export class Playing {
     this.at = number;
     by("time").value = number;
     const { at, goal } = this.frames[number];
-    const words = t("playing", { seconds: at.toFixed(1), goal: goal === "rest" ? "" : `${goal + 1}. ${goalName(this.outcome.goals[goal])}` });
+    const words = t("playing", { seconds: at.toFixed(1), goal: goal === "rest" ? "" : goalText(this.outcome.goals[goal]) });
     by("time").setAttribute("aria-valuetext", words);
     by("playWords").textContent = words;
     this.view3d.frame = this.poses[number];

@@ -20,8 +20,14 @@ export function named(table, name) {
 
 export function goalName(goal) {
   if (goal.given_name) return t(`goalNames.${goal.given_name}`) ?? goal.given_name;
-  if (!goal.body_frame) return t("goalNumber", { place: goal.goal + 1 });
+  if (!goal.body_frame) return t("goalNumber", { place: goal.goal });
   return t("goalName", { frame: named("frames", goal.body_frame), place: goal.place });
+}
+
+// The name of a goal with its number, by which the map and the command line name it.
+export function goalText(goal) {
+  const name = goalName(goal);
+  return goal.given_name || goal.body_frame ? `${name} (${goal.goal})` : name;
 }
 
 export function sentence(outcome) {

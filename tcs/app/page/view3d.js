@@ -1,5 +1,6 @@
 // The scene in space: robot, person, furniture and the coloured floor by WebGL, numbered goals on top of everything.
 
+import { MARKS, grouped } from "./marks.js";
 import { cornersOf } from "./solids.js";
 
 const COLOURS = {
@@ -193,20 +194,22 @@ export class View3d {
     [marks.width, marks.height] = [this.canvas.width, this.canvas.height];
     const context = marks.getContext("2d");
     Object.assign(context, { font: `bold ${13 * density}px system-ui, sans-serif`, textAlign: "center", textBaseline: "middle", lineWidth: 1.5 * density, strokeStyle: "#fff" });
-    this.goals.forEach((goal, i) => {
+    const size = 10 * density;
+    const seen = this.goals.map((goal, number) => {
       const [x, y, , w] = [0, 1, 2, 3].map((row) => camera[row] * goal[0] + camera[4 + row] * goal[1] + camera[8 + row] * goal[2] + camera[12 + row]);
-      if (w <= 0) return;
       const at = [((x / w + 1) / 2) * marks.width, ((1 - y / w) / 2) * marks.height];
-      const size = 10 * density;
-      context.fillStyle = this.outcomes[i]?.reached ? "#00613f" : "#a3210f";
+      return w > 0 && { at, number, reached: Boolean(this.outcomes[number]?.reached) };
+    });
+    for (const { at, text, reached, count } of grouped(seen.filter(Boolean), 1.6 * size)) {
+      const half = size * count;
+      context.fillStyle = reached ? MARKS.reached : MARKS.unreached;
       context.beginPath();
-      if (this.outcomes[i]?.reached) context.arc(...at, size, 0, 2 * Math.PI);
-      else context.rect(at[0] - size, at[1] - size, 2 * size, 2 * size);
+      context.roundRect(at[0] - half, at[1] - size, 2 * half, 2 * size, reached ? size : 0);
       context.fill();
       context.stroke();
       context.fillStyle = "#fff";
-      context.fillText(i + 1, ...at);
-    });
+      context.fillText(text, ...at);
+    }
   }
 
   zoom(factor) {

@@ -10,6 +10,7 @@ from tcs.output.draw.boxes import BoxGroup, BoxPlot, draw_boxes
 from tcs.output.draw.encoded import as_png, as_svg
 from tcs.output.draw.files import FORMATS, check_format, save_figure
 from tcs.output.draw.floor_plan import BaseFootprint
+from tcs.output.draw.goal_marks import GoalMark
 from tcs.output.draw.map import draw_map
 from tcs.output.draw.picture import ScenePanel, draw_scene
 from tcs.output.draw.population import population_figure
@@ -25,6 +26,7 @@ __all__ = [
     "BoxPlot",
     "Category",
     "Cloud",
+    "GoalMark",
     "PlaceMap",
     "ScenePanel",
     "Solid",

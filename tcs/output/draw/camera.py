@@ -53,6 +53,22 @@ def nearest_camera(subject: FloatArray, azimuth: float) -> Camera:
     return Camera(place @ R, R)
 
 
+def pixels_of(camera: Camera, points: FloatArray) -> FloatArray:
+    """Return where points before the camera are in a view, as column and row, shape (n, 2).
+
+    Args:
+        camera: The camera.
+        points: Points in the frame of the picture [m], shape (n, 3).
+
+    >>> camera = nearest_camera(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), 0.0)
+    >>> bool(np.allclose(pixels_of(camera, np.array([[0.0, 0.0, 0.5]]))[0, 0], SIZE[0] / 2 - 0.5))
+    True
+    """
+    right, up, backward = ((points - camera.p) @ camera.R.T).T
+    along = np.stack([right, -up], axis=1) / -backward[:, None]
+    return np.asarray(np.array(SIZE) / 2.0 + along * FOCAL * SIZE[1] / 2.0 - 0.5)
+
+
 def _axes(azimuth: float) -> FloatArray:
     """Return the camera's axes as rows: right, up, backward."""
     flat = np.cos(_ELEVATION)

@@ -47,6 +47,8 @@ class BaseFootprint:
     """Its configuration, in the frame of the map."""
     outline: FloatArray
     """Outline of its base in the base's own frame [m], shape (n, 2)."""
+    place: str = ""
+    """Where it is relative to the person, in words; "" for unknown."""
 
     @property
     def polygon(self) -> FloatArray:
@@ -247,7 +249,8 @@ def pose_handles(members: Sequence[BaseFootprint], here: BaseFootprint | None) -
         handles.append(Patch(facecolor="none", edgecolor=HERE, ls="--", label=f"now: {text}"))
     for number, base in enumerate(members, start=1):
         text = member_text(base.configuration.to_json())
+        place = f"{base.place}\n" if base.place else ""
         handles.append(
-            Line2D([], [], ls="none", color=MEMBER, marker="o", label=f"{number}: {text}")
+            Line2D([], [], ls="none", color=MEMBER, marker="o", label=f"{number}: {place}{text}")
         )
     return handles

@@ -14,6 +14,7 @@ from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.output.draw import floor_plan
 from tcs.output.draw.colours import HERE
 from tcs.output.draw.floor_plan import BaseFootprint
+from tcs.output.draw.goal_marks import GoalMark, draw_goal_marks, goal_handles
 from tcs.output.draw.solids import Solid
 from tcs.output.words import REACHABILITY_LABEL, axis_title, manipulability_label
 from tcs.placement.tables.place_map import FloatArray, PlaceMap
@@ -22,6 +23,10 @@ _TITLE_WIDTH = 130
 """Characters per line of the title."""
 _PANEL_WIDTH = 70
 """Characters per line above a panel."""
+_GOAL_SIZE = 0.8
+"""Size of the marks of goals: those around a face are some centimetres apart."""
+_GOALS_APART = 0.06
+"""Distance below which goals share one mark [m]: about its width."""
 _BEYOND = 0.5
 """Extent of the environment shown beyond the grid [m]: the end of a bed, not a whole wall."""
 
@@ -32,6 +37,7 @@ def draw_map(
     members: Sequence[BaseFootprint],
     *,
     here: BaseFootprint | None = None,
+    goals: Sequence[GoalMark] = (),
     title: str,
     subtitle: str = "",
     measure: str = DEFAULT_MEASURE,
@@ -43,6 +49,7 @@ def draw_map(
         environment: Furniture, person and obstacles, drawn as their outlines from above.
         members: The members of the set in the order of the tour; may be empty.
         here: The current base pose.
+        goals: The goals, which are marked.
         title: First line.
         subtitle: Second line, e.g. the scores of the set.
         measure: Name of the dexterity measure behind P_M.
@@ -63,6 +70,9 @@ def draw_map(
         axes.set_title(over, fontsize=10)
         floor_plan.draw_environment(axes, environment)
         _draw_tour(axes, members, here)
+        if goals:
+            at = np.array([mark.position[:2] for mark in goals])
+            draw_goal_marks(axes, goals, at, apart=_GOALS_APART, size=_GOAL_SIZE)
         floor_plan.draw_scale_bar(axes)
         axes.set_aspect("equal")
         axes.set_xlabel(axis_title("base_x"))
@@ -77,7 +87,7 @@ def draw_map(
             Line2D([], [], ls=":", color=HERE, label="straight-line path of the travel cost")
         )
     figure.legend(handles=handles, loc="outside lower left", ncols=2, frameon=False, fontsize=10)
-    stops = floor_plan.pose_handles(members, here)
+    stops = [*floor_plan.pose_handles(members, here), *goal_handles(goals)]
     figure.legend(handles=stops, loc="outside lower right", frameon=False, fontsize=10)
     return figure
 

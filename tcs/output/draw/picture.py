@@ -8,17 +8,23 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from tcs.output.draw import camera as cameras
 from tcs.output.draw.camera import Camera, nearest_camera
+from tcs.output.draw.goal_marks import GoalMark, draw_goal_marks, mark_handles
 from tcs.output.draw.raster import Mesh, Raster, rasterise_scene
 from tcs.output.draw.shading import shade
 from tcs.output.draw.solids import Category, FloatArray, Solid
 
 _TITLE_WIDTH = 66
 """Characters of the title per line above a view."""
+_CAPTION_WIDTH = 74
+"""Characters of a caption per line."""
+_GOALS_APART = 12.0
+"""Distance below which goals share one mark [px]: about its width."""
 _UNHIDDEN = 0.6
 """Fraction of the robot and person that a view has to show, of what the best view shows."""
 _GOALS = {Category.GOAL: 1.0, Category.CURRENT_GOAL: 5.0}
@@ -39,6 +45,8 @@ class ScenePanel:
     goals is used, with most weight on the current goal, unless the robot or the person is hidden
     from there."""
     caption: str
+    goals: Sequence[GoalMark] = ()
+    """Goals that are marked, never hidden."""
 
 
 class _Candidate(NamedTuple):
@@ -64,28 +72,33 @@ def draw_scene(views: Sequence[ScenePanel], *, title: str) -> Figure:
     figure = Figure(figsize=(6.6 * len(views), 6.6), layout="constrained")
     panels = figure.subplots(1, len(views), squeeze=False)[0]
     for axes, view in zip(panels, views, strict=True):
-        image, is_whole = _render(view)
+        image, is_whole, camera = _render(view)
         axes.imshow(image, interpolation="antialiased")
+        if view.goals:
+            at = cameras.pixels_of(camera, np.array([mark.position for mark in view.goals]))
+            draw_goal_marks(axes, view.goals, (at - 0.5) / 2.0, apart=_GOALS_APART)
         axes.set_axis_off()
-        caption = view.caption if is_whole else f"{view.caption}\n({_LEFT_OUT})"
-        axes.set_title(caption, fontsize=11)
+        lines = [*view.caption.splitlines(), *([] if is_whole else [f"({_LEFT_OUT})"])]
+        wrapped = [part for line in lines for part in textwrap.wrap(line, _CAPTION_WIDTH)]
+        axes.set_title("\n".join(wrapped), fontsize=11)
     if title:
         width = _TITLE_WIDTH * len(views)
         lines = [line for part in title.splitlines() for line in textwrap.wrap(part, width)]
         figure.suptitle("\n".join(lines), fontsize=13)
     shown = {solid.category for view in views for solid in view.solids}
-    handles = [
+    handles: list[Artist] = [
         Patch(facecolor=one.colour, edgecolor="#555555", lw=0.5, label=one.label)
         for one in Category
         if one in shown
     ]
-    columns = min(3 * len(views), 6)
+    handles += mark_handles([mark for view in views for mark in view.goals])
+    columns = min(4 * len(views), 8)
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, frameon=False)
     return figure
 
 
-def _render(view: ScenePanel) -> tuple[FloatArray, bool]:
-    """Return the picture from the best direction, shape (h, w, 3), and whether it is whole."""
+def _render(view: ScenePanel) -> tuple[FloatArray, bool, Camera]:
+    """Return the picture from the best direction, (h, w, 3), whether it is whole, the camera."""
     mesh = Mesh.of(view.solids)
     weight = np.array([_GOALS.get(solid.category, 0.0) for solid in view.solids])[mesh.owner]
     is_subject = mesh.is_subject(view.solids)
@@ -105,4 +118,4 @@ def _render(view: ScenePanel) -> tuple[FloatArray, bool]:
     width, height = cameras.SIZE
     # The average of two by two pixels smooths the edges.
     smooth = image.reshape(height // 2, 2, width // 2, 2, 3).mean(axis=(1, 3))
-    return np.asarray(smooth), not best.left_out
+    return np.asarray(smooth), not best.left_out, best.camera

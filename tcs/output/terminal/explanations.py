@@ -65,6 +65,8 @@ def _print_explained(out: Console, result: Mapping[str, Any]) -> None:
         number = explained["configuration"]
         offset = ", ".join(_with_unit(axis, value) for axis, value in explained["offset"].items())
         out.print(f"The nearest scored configuration is {number}; it differs by {offset}.")
+    if explained["place"]:
+        out.print(explained["place"])
     if explained["reached"]:
         out.print(f"It is reached from {name}, {result['measure']} {explained['dexterity']:.3f}.")
         _print_refined(out, result)
@@ -105,15 +107,17 @@ def _print_fix(out: Console, result: Mapping[str, Any]) -> None:
         return
     out.print(f"The nearest configuration that reaches it is {fix['configuration']}:")
     out.print(f"  {fix['sentence']}")
+    if fix["place"]:
+        out.print(f"  {fix['place']}")
     out.print(
         members_table(
             [explained["members"][0], fix["members"][0]], "", ("explained", "nearest reaching")
         )
     )
-    lost = fix["lost_goals"]
-    loses = f", and no longer {goal_list(lost)}" if lost else ""
+    lost, names = fix["lost_goals"], result["goal_names"]
+    loses = f", and no longer {goal_list(lost, names)}" if lost else ""
     out.print(
-        f"It reaches {goals_text(fix['reached_goals'])}{loses}; "
+        f"It reaches {goals_text(fix['reached_goals'], names)}{loses}; "
         f"manipulability {fix['manipulability']:.3f}, at this goal {fix['dexterity']:.3f}."
     )
     out.print(f"Cost {fix['cost']:.2f}, at {_weights(result['weights'], fix)}.")

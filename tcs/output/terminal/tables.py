@@ -26,6 +26,7 @@ from tcs.output.words import (
     reason_of,
     scores_text,
     settings_text,
+    stop_places,
 )
 from tcs.output.words.verification import check_lines
 
@@ -167,6 +168,8 @@ def report_rows(result: Mapping[str, Any]) -> None:
 def report_choice(result: Mapping[str, Any]) -> None:
     """Print a selected set."""
     out = results_console()
+    for line in stop_places(result["places"]):
+        out.print(line)
     out.print(members_table(result["members"]))
     scores = scores_text(result["reachability"], result["manipulability"], result["measure"])
     out.print(

@@ -6,6 +6,7 @@ for the command line, reports, the viewer and pictures. Nothing here draws, simu
 
 from __future__ import annotations
 
+from tcs.output.words.answers import choice_in_words, explanation_in_words
 from tcs.output.words.assignment import assign_goals, assigned_goals
 from tcs.output.words.bodies import body_name, frame_name, pair_text
 from tcs.output.words.configurations import (
@@ -22,13 +23,23 @@ from tcs.output.words.configurations import (
     setting_text,
     settings_text,
 )
-from tcs.output.words.goals import goal_list, goal_place, goal_text, goals_by_reason, goals_text
+from tcs.output.words.goals import (
+    goal_list,
+    goal_names,
+    goal_place,
+    goal_text,
+    goals_by_reason,
+    goals_text,
+    text_of_goal,
+)
 from tcs.output.words.measures import REACHABILITY_LABEL, manipulability_label, scores_text
 from tcs.output.words.numbers import p_value, percent, percentage, signed
 from tcs.output.words.people import person_text
 from tcs.output.words.places import (
     RelativePlace,
     frames_of_state,
+    member_places,
+    place_in_line,
     relative_place,
     stop_places,
 )
@@ -56,22 +67,27 @@ __all__ = [
     "axis_value",
     "base_pose_text",
     "body_name",
+    "choice_in_words",
     "colour_legend",
     "deviation_text",
+    "explanation_in_words",
     "frame_name",
     "frames_of_state",
     "goal_list",
+    "goal_names",
     "goal_place",
     "goal_text",
     "goals_by_reason",
     "goals_text",
     "manipulability_label",
+    "member_places",
     "member_text",
     "p_value",
     "pair_text",
     "percent",
     "percentage",
     "person_text",
+    "place_in_line",
     "quantity",
     "reason_of",
     "relative_place",
@@ -80,4 +96,5 @@ __all__ = [
     "settings_text",
     "signed",
     "stop_places",
+    "text_of_goal",
 ]

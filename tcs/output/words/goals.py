@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tcs.output.words.bodies import frame_name
 from tcs.placement.tables import Reason
@@ -12,30 +12,62 @@ if TYPE_CHECKING:
     from tcs.model.tasks import Goal
 
 
+def goal_names(task: Mapping[str, Any], goals: int) -> tuple[str, ...]:
+    """Return where each goal of a task is, as people say it.
+
+    Args:
+        task: The task, as a score file holds it.
+        goals: Number of goals.
+
+    Returns:
+        The name of each goal; for a goal without one, its body frame and its number among the goals
+        there, from 1; "" where the task states neither.
+
+    >>> on_head = {"body_frame": "head"}
+    >>> goal_names({"goals": [on_head, {"name": "chin", **on_head}, on_head]}, 3)
+    ('head, place 1', 'chin', 'head, place 3')
+    """
+    frames = [text_of_goal(task, goal, "body_frame") for goal in range(goals)]
+    names = []
+    for goal, frame in enumerate(frames):
+        on_frame = f"{frame_name(frame)}, place {frames[: goal + 1].count(frame)}" if frame else ""
+        names.append(text_of_goal(task, goal, "name") or on_frame)
+    return tuple(names)
+
+
+def text_of_goal(task: Mapping[str, Any], goal: int, key: str) -> str | None:
+    """Return a text that a score file holds of a goal, None if it holds none."""
+    goals = task.get("goals")
+    if not isinstance(goals, Sequence) or goal >= len(goals) or not isinstance(goals[goal], dict):
+        return None
+    text = goals[goal].get(key)
+    return text if isinstance(text, str) and text else None
+
+
 def goal_text(goal: int, name: str | None) -> str:
-    """Return the number of a goal, with its name if it has one.
+    """Return the name of a goal, if it has one, and its number, by which options name it.
 
     >>> goal_text(2, "left cheek"), goal_text(2, "")
-    ('2 (left cheek)', '2')
+    ('left cheek (2)', '2')
     """
-    return f"{goal} ({name})" if name else str(goal)
+    return f"{name} ({goal})" if name else str(goal)
 
 
 def goal_list(goals: Iterable[int], names: Sequence[str] = ()) -> str:
-    """Return the numbers of goals.
+    """Return the names and numbers of goals.
 
     Args:
         goals: The goals.
-        names: Names of all goals of the task, to add them; "" for a goal without a name.
+        names: Names of all goals of the task; "" for a goal without a name. None for numbers alone.
 
     >>> goal_list([0, 3]), goal_list([0, 1], ["chin", ""])
-    ('0, 3', '0 (chin), 1')
+    ('0, 3', 'chin (0), 1')
     """
     return ", ".join(goal_text(goal, names[goal] if names else "") for goal in goals)
 
 
 def goals_text(goals: Sequence[int], names: Sequence[str] = ()) -> str:
-    """Return the numbers of goals after the word "goal".
+    """Return the names and numbers of goals after the word "goal".
 
     Args:
         goals: The goals.

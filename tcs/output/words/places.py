@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from tcs.model.grid import InitialConfiguration
     from tcs.placement.store import ScoreFile
 
 _LANDMARKS = {
@@ -83,23 +84,52 @@ def frames_of_state(file: ScoreFile, table: int, state: int) -> dict[str, list[f
     }
 
 
-def stop_places(file: ScoreFile, table: int, indices: Sequence[int]) -> list[str]:
-    """Return for each stop of a set where it is relative to the person; none without a person.
+def member_places(
+    file: ScoreFile,
+    table: int,
+    indices: Sequence[int],
+    members: Sequence[InitialConfiguration] = (),
+) -> list[str]:
+    """Return for each member of a set where it is relative to the person; "" without a person.
 
     Args:
         file: A score file.
         table: Number of the table.
         indices: Flat indices of the configurations.
+        members: The members of a refined set, which are off the grid: `indices` are the
+            configurations that they were refined from, whose state of the environment is taken.
     """
+    grid = file.configurations
     texts = []
-    for number, index in enumerate(indices, start=1):
-        member = file.configurations.configuration(index)
-        state = int(file.configurations.state_of(np.array([index]))[0])
-        frames = frames_of_state(file, table, state)
+    for member, index in zip(
+        members or [grid.configuration(h) for h in indices], indices, strict=True
+    ):
+        frames = frames_of_state(file, table, int(grid.state_of(np.array([index]))[0]))
         place = relative_place(member.base_x, member.base_y, member.base_yaw, frames)
-        if place is not None:
-            texts.append(f"Stop {number}: {place.text[0].lower()}{place.text[1:]}")
+        texts.append("" if place is None else place.text)
     return texts
+
+
+def place_in_line(place: str) -> str:
+    """Return a place within a line: without a capital letter and a full stop.
+
+    >>> place_in_line("In front of the person, facing them.")
+    'in front of the person, facing them'
+    """
+    return f"{place[:1].lower()}{place[1:].removesuffix('.')}"
+
+
+def stop_places(places: Sequence[str]) -> list[str]:
+    """Return a sentence for each stop of a set with a place relative to the person.
+
+    >>> stop_places(["In front of the person, facing them.", ""])
+    ['Stop 1: in front of the person, facing them.']
+    """
+    return [
+        f"Stop {number}: {place_in_line(place)}."
+        for number, place in enumerate(places, start=1)
+        if place
+    ]
 
 
 def relative_place(

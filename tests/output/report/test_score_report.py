@@ -110,9 +110,8 @@ def test_joints_and_stops_are_those_of_the_file(report):
         heading = math.degrees(member.base_yaw) % 360
         assert float(column(table, "heading [deg]")[number]) == pytest.approx(heading, abs=0.5)
     listed = ", ".join(column(table, "Serves goals")).split(", ")
-    assert sorted(map(int, listed)) == [
-        g for g, at in enumerate(report.assignment) if at is not None
-    ]
+    reached = [g for g, at in enumerate(report.assignment) if at is not None]
+    assert sorted(listed) == sorted(f"{report.goal_names[g]} ({g})" for g in reached)
 
 
 def test_every_configuration_counts_once_for_each_goal(report):
@@ -134,7 +133,7 @@ def test_goals_that_one_base_pose_misses_have_a_reason_and_a_change(single):
     assert single.unreached
     wording = as_markdown(make_score_page(single, command="c"))
     for goal in single.unreached:
-        named = f"{goal} ({single.goal_names[goal]})"
+        named = f"{single.goal_names[goal]} ({goal})"
         assert f"The cheapest change from stop 1 that reaches goal {named}: " in wording
     assert f"Not reached: {goals_text(single.unreached, single.goal_names)}." in wording
     assert "Nothing was re-checked" in wording

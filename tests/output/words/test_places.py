@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from tcs.output.words import relative_place
+from tcs.output.words import relative_place, stop_places
 
 SITTING = {
     "head": (0.45, 0.0, 1.2), "chest": (0.4, 0.0, 1.1), "lower_body": (0.44, 0.0, 0.6),
@@ -45,3 +45,8 @@ def test_moving_room_and_robot_together_changes_nothing(turn_deg):
 def test_without_a_person_there_is_no_place():
     assert relative_place(0.0, 0.0, 0.0, {}) is None
     assert relative_place(0.0, 0.0, 0.0, {"head": (0.0, 0.0, 1.0)}) is None
+
+
+def test_stops_are_sentences_and_those_without_a_place_are_left_out():
+    places = ["On the person's right, beside the knees, facing them.", ""]
+    assert stop_places(places) == ["Stop 1: on the person's right, beside the knees, facing them."]

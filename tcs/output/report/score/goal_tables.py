@@ -27,7 +27,7 @@ def stops_table(report: ScoreReport) -> Table:
         [
             str(number + 1),
             *(axis_value(key, value) for key, value in member.items()),
-            goal_list(assigned_goals(report.assignment, number)) or "none",
+            goal_list(assigned_goals(report.assignment, number), report.goal_names) or "none",
         ]
         for number, member in enumerate(members)
     ]

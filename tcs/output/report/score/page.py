@@ -89,7 +89,7 @@ def _views(report: ScoreReport) -> list[Block]:
     blocks: list[Block] = []
     for number, view in enumerate(report.views):
         goals = assigned_goals(report.assignment, number)
-        served = goals_text(goals) if goals else "no goal"
+        served = goals_text(goals, report.goal_names) if goals else "no goal"
         blocks.append(
             Picture(
                 view,

@@ -12,15 +12,18 @@ from tcs.errors import SelectionError
 from tcs.kernel.arrays import BOX
 from tcs.model.grid import Grid, InitialConfiguration
 from tcs.model.scene import Scene, goal_poses
+from tcs.model.tasks import Task
 from tcs.output.draw import (
     BaseFootprint,
     Category,
+    GoalMark,
     PlaceMap,
     ScenePanel,
     draw_map,
     draw_scene,
     primitive_corners,
 )
+from tcs.output.draw.solids import FloatArray
 from tcs.output.report.score.scene_solids import (
     base_outline,
     environment_solids,
@@ -28,7 +31,14 @@ from tcs.output.report.score.scene_solids import (
     robot_solids,
 )
 from tcs.output.report.score.shown_set import ShownSet
-from tcs.output.words import arm_text, assign_goals, assigned_goals, goals_text
+from tcs.output.words import (
+    arm_text,
+    assign_goals,
+    assigned_goals,
+    goal_text,
+    goals_text,
+    place_in_line,
+)
 from tcs.placement.scoring import Job, rebuild_scene
 from tcs.placement.store import ScoreFile, file_of_arm
 
@@ -84,12 +94,35 @@ def map_figure(file: ScoreFile, shown: ShownSet, scored: ScoredScene | None = No
     return draw_map(
         PlaceMap.of(file.tables[shown.table].scores, Grid.from_dict(file.grid)),
         environment_solids(scene, in_mount=True),
-        [BaseFootprint(member, base) for member in shown.members],
+        base_footprints(shown, base),
+        goals=goal_marks(scene, job.task, shown),
         here=BaseFootprint(shown.here, base) if shown.here is not None else None,
         title=title_of(job, file),
         subtitle=shown.subtitle,
         measure=file.metadata["measure"],
     )
+
+
+def base_footprints(shown: ShownSet, base: FloatArray) -> list[BaseFootprint]:
+    """Return the members of a set as bases, with their places in words.
+
+    Args:
+        shown: The set.
+        base: Outline of the base in its own frame [m], shape (n, 2).
+    """
+    return [
+        BaseFootprint(member, base, place_in_line(place))
+        for member, place in zip(shown.members, shown.places, strict=True)
+    ]
+
+
+def goal_marks(scene: Scene, task: Task, shown: ShownSet) -> list[GoalMark]:
+    """Return the goals in the present state of the scene, in the frame of the base poses."""
+    names, assignment = shown.goal_names, assign_goals(shown.scores, shown.rows)
+    return [
+        GoalMark(goal, names[goal], X.translation(), is_reached=assignment[goal] is not None)
+        for goal, X in enumerate(scene.seen_from_mount(goal_poses(scene, task)))
+    ]
 
 
 def scene_figure(file: ScoreFile, shown: ShownSet) -> Figure:
@@ -162,7 +195,7 @@ def _member_panel(
     """Return the panel of one member: robot and person, or a close view of the tool at its goal."""
     job, scene = scored
     member, h = shown.members[number], shown.rows[number]
-    scores = shown.scores
+    scores, names = shown.scores, shown.goal_names
     served = assigned_goals(assign_goals(scores, shown.rows), number)
     current = max(served, key=lambda g: float(scores.dexterity[h, g]), default=None)
     _set_environment(scene, member)
@@ -182,14 +215,20 @@ def _member_panel(
     along = math.atan2(*(goals.mean(axis=0) - base)[[1, 0]])
     if is_close and current is not None:
         subject, angles_deg = goals[current] + _AROUND_A_GOAL, [60.0, -60.0, 120.0, -120.0]
-        caption = f"the tool at goal {current}"
+        caption = f"the tool at goal {goal_text(current, names[current])}"
     else:
         # Furniture may extend beyond the picture; robot, person and goals may not.
         whole = [solid.corners for solid in solids if solid.category is not Category.FURNITURE]
         subject, angles_deg = np.concatenate(whole), [70.0, -70.0]
         arm = f", {arm_text(member.arm)}" if member.arm else ""
-        caption = f"stop {number + 1}{arm}, serves {goals_text(served) if served else 'no goal'}"
+        where = place_in_line(shown.places[number])
+        caption = f"stop {number + 1}{arm}{f': {where}' if where else ''}\n"
+        caption += f"serves {goals_text(served, names) if served else 'no goal'}"
         if current is not None:
-            caption += f"; arm at goal {current}"
+            caption += f"; arm at goal {goal_text(current, names[current])}"
     azimuths = tuple(along + math.radians(angle) for angle in angles_deg)
-    return ScenePanel(solids, subject, azimuths, caption)
+    marks = [
+        GoalMark(goal, names[goal], at, is_reached=bool(scores.reached[h, goal]))
+        for goal, at in enumerate(goals)
+    ]
+    return ScenePanel(solids, subject, azimuths, caption, marks)

@@ -101,8 +101,8 @@ class ScoreReport:
 
     @property
     def goal_names(self) -> tuple[str, ...]:
-        """Where each goal is, as people say it; "" for a goal without a name."""
-        return tuple(goal.name for goal in self.job.task.goals)
+        """Where each goal is, as people say it; "" where the file does not state it."""
+        return self.shown.goal_names
 
     @property
     def scores(self) -> tuple[float, float]:

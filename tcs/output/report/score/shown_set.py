@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from tcs.model.grid import Grid, InitialConfiguration
-from tcs.output.words import base_pose_text, scores_text
+from tcs.output.words import base_pose_text, goal_names, member_places, scores_text
 from tcs.placement.refinement import refined_table, score_members
 from tcs.placement.selection import SelectionTables, UtilityWeights, nearest_table, select
 from tcs.placement.store import ScoreFile
@@ -105,6 +105,16 @@ class ShownSet:
     def stored(self) -> tuple[int, ...]:
         """Flat indices of the members, ascending; () for a refined set, which is off the grid."""
         return tuple(sorted(self.indices)) if self.refined is None else ()
+
+    @property
+    def places(self) -> list[str]:
+        """Where each member is relative to the person, as a sentence; "" without a person."""
+        return member_places(self.file, self.table, self.indices, self.members)
+
+    @property
+    def goal_names(self) -> tuple[str, ...]:
+        """Where each goal is, as people say it; "" where the file does not state it."""
+        return goal_names(self.file.task, self.scores.goals)
 
     @property
     def reachability(self) -> float:

@@ -9,9 +9,14 @@ from matplotlib.figure import Figure
 
 from tcs.errors import SelectionError
 from tcs.model.grid import Axis, Grid
-from tcs.output.draw import BaseFootprint, PlaceMap, StatePanel, draw_states
+from tcs.output.draw import PlaceMap, StatePanel, draw_states
 from tcs.output.draw.states import Score
-from tcs.output.report.score.pictures import ScoredScene, scored_scene, title_of
+from tcs.output.report.score.pictures import (
+    ScoredScene,
+    base_footprints,
+    scored_scene,
+    title_of,
+)
 from tcs.output.report.score.scene_solids import base_outline, environment_solids
 from tcs.output.report.score.shown_set import ShownSet
 from tcs.output.words import axis_name, quantity
@@ -63,7 +68,7 @@ def states_figure(
     job, scene = scored or scored_scene(file, shown, arm=next(iter(file.arms), None))
     base = base_outline(scene)
     scores = file.tables[shown.table].scores
-    stands = [BaseFootprint(member, base) for member in shown.members]
+    stands = base_footprints(shown, base)
 
     def panel(state: int) -> StatePanel:
         at = grid.configuration(state * grid.state_size)

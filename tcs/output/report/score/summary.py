@@ -38,7 +38,7 @@ def summary_blocks(report: ScoreReport) -> list[Block]:
         f"From {stops} the robot reaches {reached} of {goals} goals (P_R "
         f"{percentage(reachability)}); P_M is {manipulability:.3f} ({report.measure})."
     ]
-    items += stop_places(report.file, report.shown.table, report.shown.indices)
+    items += stop_places(report.shown.places)
     if report.unreached:
         items.append(
             f"Not reached: {goals_text(report.unreached, report.goal_names)}. The section Goals "

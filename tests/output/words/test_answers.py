@@ -1,0 +1,52 @@
+"""Answers with their words: each place belongs to the base pose beside it."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import tcs
+from tcs.output.words import choice_in_words, explanation_in_words, relative_place
+from tests.placement.store.example import score_file
+
+# No axis of the body through base positions of the grid: rounding would decide on the sides.
+BODY = {
+    "head": (0.017, 0.013, 1.2), "lower_body": (0.017, 0.013, 0.6),
+    "foot_left": (0.713, 0.113, 0.2), "foot_right": (0.717, -0.087, 0.2),
+}  # fmt: skip
+FILE = score_file(body_frames={name: [*at, *at] for name, at in BODY.items()})
+"""A file with two states of the environment."""
+
+
+def place(member):
+    yaw = math.radians(member["base_yaw_deg"])
+    return relative_place(member["base_x"], member["base_y"], yaw, BODY).text
+
+
+def test_each_stop_has_its_place():
+    turned = set()
+    for x, y in itertools.product((-3.0, 0.0, 3.0), repeat=2):
+        here = tcs.InitialConfiguration(base_x=x, base_y=y, base_yaw=0.0, torso=0.0)
+        choice = tcs.select(FILE, here, weights=tcs.UtilityWeights(travel=0.01))
+        found = choice_in_words(FILE, choice)
+        assert found["places"] == [place(member) for member in found["members"]]
+        assert len(set(found["places"])) == 2
+        turned.add(choice.order == tuple(sorted(choice.order)))
+    assert turned == {True, False}
+
+
+def test_explanations_name_goals_and_places():
+    seen = set()
+    for index in range(0, FILE.configurations.size, 7):
+        found = explanation_in_words(FILE, tcs.explain(FILE, 2, index))
+        assert found["goal_names"] == ["head, place 1", "", "", "", ""]
+        for key in ("explained", "nearest_reaching"):
+            assert found[key]["place"] == place(found[key]["members"][0])
+            seen.add((key, found[key]["place"]))
+    assert len(seen) > 4
+
+
+def test_without_a_person_there_is_no_place():
+    here = tcs.InitialConfiguration(base_x=0.0, base_y=0.0, base_yaw=0.0, torso=0.0)
+    file = score_file()
+    assert set(choice_in_words(file, tcs.select(file, here))["places"]) == {""}
