@@ -11,12 +11,12 @@ from tcs.output.words.goals import goal_names
 from tcs.output.words.places import member_places
 
 if TYPE_CHECKING:
+    from tcs.placement import selection
     from tcs.placement.reasons import Explanation
-    from tcs.placement.selection import Choice
     from tcs.placement.store import ScoreFile
 
 
-def choice_in_words(file: ScoreFile, choice: Choice) -> dict[str, Any]:
+def choice_in_words(file: ScoreFile, choice: selection.Choice) -> dict[str, Any]:
     """Return a choice as plain containers.
 
     Args:
