@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import signal
 from pathlib import Path
 
@@ -12,8 +11,6 @@ import pytest
 from tcs.model.grid import Grid
 from tcs.model.robots import load_robot
 from tcs.model.scene import Scene, SceneSpec, load_environment, lower
-from tcs.model.scene import scene as scene_module
-from tcs.model.scene.plant import build_plant
 from tcs.model.tasks import load_task
 
 HERE = Path(__file__).parent
@@ -38,17 +35,6 @@ def _interruptible():
     """Restore Ctrl-C, which some tests send and which shells make background jobs ignore."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
-@pytest.fixture(autouse=True, scope="session")
-def _plants_are_built_once():
-    """Share finalized plants, which nothing changes, between the scenes of one specification.
-
-    A plant takes most of the time that a scene does; each scene has a context of its own.
-    """
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(scene_module, "build_plant", functools.lru_cache(maxsize=16)(build_plant))
-        yield
 
 
 @pytest.fixture(scope="session")
