@@ -12,7 +12,8 @@ favourable state of the environment.
 
 CMA-ES (benchmarks/cma_baseline.py) searches the same space for two members, for the time that
 scoring and the refinement among all sets took: it knows no error. Times are processor times, of one
-process with one thread; rows are shared among processes. `--seeds 0` leaves CMA-ES out.
+process with one thread; rows are shared among processes. `--seeds 0` leaves CMA-ES out. With
+`--save`, the saved rows that a run does not measure are kept: `--rows` renews some of them.
 """
 
 from __future__ import annotations
@@ -83,9 +84,9 @@ def main() -> None:
         begun = time.perf_counter()
         kept = dict(zip(names, pool.map(partial(refined_row, place), names), strict=True))
         row("wall time of all refinements", f"{time.perf_counter() - begun:.1f} s")
-        record("total", ("rows", "processes", "wall time [s]"), [
-            [str(len(names)), str(options.processes), f"{time.perf_counter() - begun:.1f}"]
-        ])  # fmt: skip
+        if not options.rows:
+            cells = str(len(names)), str(options.processes), f"{time.perf_counter() - begun:.1f}"
+            record("total", ("rows", "processes", "wall time [s]"), [cells])
         rows, surest, ours = [], [], {}
         print(" | ".join(COLUMNS))
         for found in pool.map(partial(judged_row, place, options), names):
@@ -97,14 +98,14 @@ def main() -> None:
             print(" | ".join(rows[-1]), "|", " | ".join(surest[-1][1:]), flush=True)
             record("rows", COLUMNS, rows)
             record("surest", SUREST_COLUMNS, surest)
-            save(options)
+            save(options, keep=True)
         compared = []
         for name in names if options.seeds else ():
             run = partial(baseline, place, name, ours[name][3])
             compared.append(beside(name, ours[name], list(pool.map(run, range(options.seeds)))))
             print(" | ".join(compared[-1]), flush=True)
             record("cma", CMA_COLUMNS, compared)
-            save(options)
+            save(options, keep=True)
     row("rows", str(len(rows)))
 
 

@@ -5,7 +5,8 @@ Usage: python benchmarks/placing.py [--robots panda iiwa7] [--trajectories 100] 
 
 A joint path is straight between two random postures, certified free of contact; its tool poses, 2
 to 64 of them, are moved to a random base pose. So every trajectory can be done from one base pose,
-by one continuous joint path. Times are processor times of calls after the first.
+by one continuous joint path. Times are processor times of calls after the first. With `--save`, the
+saved rows of other robots are kept.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ def main() -> None:
         rows.append(measured(robot, options))
         row(robot, ", ".join(rows[-1][1:]))
         record("rows", COLUMNS, rows)
-        save(options)
+        save(options, keep=True)
 
 
 def measured(robot: str, options: argparse.Namespace) -> list[str]:

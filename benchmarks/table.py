@@ -1,7 +1,8 @@
 """What every benchmark prints and saves: machine, versions, and measured values with their spread.
 
 A benchmark run with `--save` writes what it measured to `benchmarks/figures/<script>.json`. The
-tables in README and docs are made from those files by `make figures`.
+tables in README and docs are made from those files by `make figures`. A benchmark whose rows can be
+measured one by one keeps the saved rows that a run did not measure, with the run they are of.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tcs.files.writing import make_folder, whole_file
 
@@ -97,8 +98,14 @@ def record_text(name: str, text: str) -> None:
     _tables[name] = {"text": text}
 
 
-def save(options: argparse.Namespace) -> None:
-    """Write the recorded tables where `--save` was given."""
+def save(options: argparse.Namespace, *, keep: bool = False) -> None:
+    """Write the recorded tables where `--save` was given.
+
+    Args:
+        options: The command line.
+        keep: Whether saved tables, and rows with another first cell, that this run did not measure
+            are kept, with the run they are of.
+    """
     if not options.save:
         return
     script = Path(sys.argv[0])
@@ -106,19 +113,73 @@ def save(options: argparse.Namespace) -> None:
         columns = list(dict.fromkeys(column for cells in lines.values() for column in cells))
         rows = [[line, *(cells.get(c, "") for c in columns)] for line, cells in lines.items()]
         record(table, ["", *columns], rows)
-    saved = {
+    saved: dict[str, Any] = {
         "command": shlex.join(
             ["python", f"benchmarks/{script.name}", *(a for a in sys.argv[1:] if a != "--save")]
         ),
         "date": datetime.now(UTC).date().isoformat(),
         **_began,
-        "tables": _tables,
+        "tables": dict(_tables),
     }
     make_folder(FIGURES)
     path = FIGURES / f"{script.stem}.json"
+    if keep and path.exists():
+        saved = with_earlier(saved, json.loads(path.read_text(encoding="utf-8")))
     with whole_file(path, "Figures") as file:
         file.write(json.dumps(saved, indent=1, ensure_ascii=False).encode() + b"\n")
     print(f"wrote {path}")
+
+
+def with_earlier(saved: dict[str, Any], before: dict[str, Any]) -> dict[str, Any]:
+    """Return what a run saved, with the tables and rows of earlier runs that it did not measure.
+
+    Rows are the same if their first cells are. A table that this run has with other columns, or
+    as a text, replaces the earlier one.
+
+    Args:
+        saved: What `save` writes, of this run.
+        before: What was written before. Its key `earlier` has, for each table, the runs that rows
+            were kept from: their first cells, command, date, machine, load and versions.
+    """
+    tables, earlier = {}, {}
+    for name in dict.fromkeys([*before["tables"], *saved["tables"]]):
+        old, new = before["tables"].get(name), saved["tables"].get(name)
+        if new is not None and (old is None or new.get("columns") != old.get("columns", ())):
+            tables[name] = new
+            continue
+        measured = {cells[0]: cells for cells in (new["rows"] if new else ())}
+        kept = [cells[0] for cells in old.get("rows", [["all"]]) if cells[0] not in measured]
+        tables[name] = old
+        if new is not None:
+            rows = [measured.pop(cells[0], cells) for cells in old["rows"]]
+            tables[name] = {**new, "rows": [*rows, *measured.values()]}
+        runs = _runs_of(kept, name, saved, before)
+        if runs:
+            earlier[name] = runs
+    return {**saved, "tables": tables, **({"earlier": earlier} if earlier else {})}
+
+
+def _runs_of(
+    rows: list[str], table: str, saved: dict[str, Any], before: dict[str, Any]
+) -> list[dict[str, Any]]:
+    """Return the earlier runs that rows of a table are of, without those of the present command."""
+    runs = [dict(run) for run in before.get("earlier", {}).get(table, ())]
+    named = {row for run in runs for row in run["rows"]}
+    last = {key: before[key] for key in before if key not in ("tables", "earlier")}
+    runs.append({"rows": [row for row in rows if row not in named], **last})
+    for run in runs:
+        run["rows"] = [row for row in run["rows"] if row in rows]
+    present = {key: saved[key] for key in saved if key != "tables"}
+    return [run for run in runs if run["rows"] and run != {"rows": run["rows"], **present}]
+
+
+def saved_rows(table: str, columns: Sequence[str]) -> dict[str, list[str]]:
+    """Return the rows of a table that earlier runs of this script saved, by their first cells."""
+    path = FIGURES / f"{Path(sys.argv[0]).stem}.json"
+    saved = json.loads(path.read_text(encoding="utf-8"))["tables"] if path.exists() else {}
+    if saved.get(table, {}).get("columns") != list(columns):
+        return {}
+    return {cells[0]: cells for cells in saved[table]["rows"]}
 
 
 def spread(seconds: list[float], unit: str = "s", scale: float = 1.0) -> str:

@@ -9,7 +9,8 @@ Each task is scored by that measure, on the bed with the person at the nominal p
 set of the grid, a run of CMA-ES as in the original program, the set refined by TOC's score and the
 set refined by its success are judged in the same rooms with TOC's errors: chair 12.5 mm and 2.5
 deg, person 25 and 50 mm along and across the body and 5 deg (normal, standard deviations).
-With `--head-turn`, the person in the wheelchair may turn the head for the tasks at the face.
+With `--head-turn`, the person in the wheelchair may turn the head for the tasks at the face. With
+`--save`, the saved rows that a run does not measure are kept.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from pathlib import Path
 import numpy as np
 from cma_baseline import cma_run
 from optimum import SUREST, first_set, label, on_grid, warm_up
-from table import CHECKOUT, header, parser, record, row, save
+from table import CHECKOUT, header, parser, record, row, save, saved_rows
 
 import tcs
 from tcs.kernel.arrays import FloatArray
@@ -48,6 +49,7 @@ CHAIR_ERRORS = """  person_yaw: {distribution: normal, std_deg: 5}
 HEAD_TURN = CHECKOUT / "examples" / "wheelchair_head_turn.yaml"
 SETS = ("best of the grid", "CMA-ES", "refined by TOC's score", "refined by success")
 COLUMNS = ("task, environment", *SETS)
+MEAN_COLUMNS = ("mean of the rows", "rows", *SETS)
 
 
 def main() -> None:
@@ -76,9 +78,14 @@ def main() -> None:
             goals.append([label(name), *cells(found, 0)])
             rooms.append([label(name), *cells(found, 1)])
             print(" | ".join(rooms[-1]), "| goals:", " | ".join(goals[-1][1:]), flush=True)
-            record("goals", COLUMNS, [*goals, mean_of(goals)])
-            record("rooms", COLUMNS, [*rooms, mean_of(rooms)])
-            save(options)
+            record("goals", COLUMNS, goals)
+            record("rooms", COLUMNS, rooms)
+            means = [
+                mean_of("goals reached", "goals", goals),
+                mean_of("rooms with all goals reached", "rooms", rooms),
+            ]
+            record("means", MEAN_COLUMNS, means)
+            save(options, keep=True)
     row("rows", str(len(names)))
 
 
@@ -87,11 +94,12 @@ def cells(found: Sequence[tuple[float, float]], which: int) -> list[str]:
     return [f"{100.0 * pair[which]:.1f} %" for pair in found]
 
 
-def mean_of(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return the mean over the rows of a table."""
-    columns = list(zip(*rows, strict=True))[1:]
+def mean_of(name: str, table: str, rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return a row with the mean over a table, with the rows that earlier runs saved."""
+    cells_by_row = {**saved_rows(table, COLUMNS), **{cells[0]: list(cells) for cells in rows}}
+    columns = list(zip(*cells_by_row.values(), strict=True))[1:]
     means = [np.mean([float(cell.split()[0]) for cell in column]) for column in columns]
-    return ["mean", *(f"{value:.1f} %" for value in means)]
+    return [name, str(len(cells_by_row)), *(f"{value:.1f} %" for value in means)]
 
 
 def environment_file(folder: Path, environment: str, options: argparse.Namespace) -> Path:

@@ -119,7 +119,8 @@ def as_markdown(saved: Mapping[str, Any], table: str, *, source: bool = True) ->
     Args:
         saved: Of one script.
         table: Name of the table.
-        source: Whether machine, versions and command follow.
+        source: Whether machine, versions and command follow; those of rows that were kept from
+            earlier runs always do.
     """
     found = saved["tables"][table]
     if "text" in found:
@@ -128,13 +129,19 @@ def as_markdown(saved: Mapping[str, Any], table: str, *, source: bool = True) ->
         columns, rows = found["columns"], found["rows"]
         lines = [f"| {' | '.join(columns)} |", f"|{'---|' * len(columns)}"]
         lines += [f"| {' | '.join(cells)} |" for cells in rows]
+    for run in saved.get("earlier", {}).get(table, ()):
+        lines += ["", f"*Earlier: {'; '.join(run['rows'])}: {run_text(run)}*"]
     if source:
-        where = (
-            f"*`{saved['command']}`, {saved['date']}: {saved['machine']}, load {saved['load']}; "
-            f"Python {saved['python']}, {saved['versions']}.*"
-        )
-        lines += ["", where]
+        lines += ["", f"*{run_text(saved)}*"]
     return "\n".join([*lines, ""])
+
+
+def run_text(run: Mapping[str, Any]) -> str:
+    """Return command, date, machine and versions of a run of a benchmark."""
+    return (
+        f"`{run['command']}`, {run['date']}: {run['machine']}, load {run['load']}; "
+        f"Python {run['python']}, {run['versions']}."
+    )
 
 
 def cell_of(saved: Mapping[str, Any], table: str, row: str, column: str) -> str:

@@ -135,6 +135,17 @@ def test_cells_tables_and_outputs_are_inserted_and_the_source_once(made):
     assert made.rewritten(text) == text
 
 
+def test_rows_of_an_earlier_run_are_named(made):
+    path = made.FIGURES / "made.json"
+    saved = json.loads(path.read_text(encoding="utf-8"))
+    where = dict.fromkeys(("date", "machine", "load", "python", "versions"), "y")
+    run = {"rows": ["step"], "command": "python benchmarks/made.py --rows step", **where}
+    path.write_text(json.dumps({**saved, "earlier": {"times": [run]}}), encoding="utf-8")
+    text = made.rewritten(PAGE)
+    assert text.count("*Earlier: step: `python benchmarks/made.py --rows step`, y: y, load y;") == 2
+    assert made.rewritten(text) == text
+
+
 def test_what_is_not_saved_keeps_what_the_page_holds(made):
     held = PAGE.replace("made/", "other/").replace("<!-- end", "| 1 |\n<!-- end", 1)
     text = made.rewritten(held)
