@@ -116,7 +116,7 @@ def scoring_commands(environment: Path, scores: Path) -> tuple[Command, ...]:
     """
     make = ("score", "shaving", "--environment", str(environment))
     samples = ("--samples", "64")
-    people = ("--bodies", "6", "--sets", "2", "--out", "{out}")
+    people = ("--bodies", "6", "--sets", "2", "--map", "{out}")
     return (
         Command("score", (*make, "--out", "{out}"), "out.tcs", scores=True),
         Command(
@@ -140,6 +140,19 @@ def scoring_commands(environment: Path, scores: Path) -> tuple[Command, ...]:
             "out.icm",
         ),
         Command("population", ("population", str(scores), *people), "out.png"),
+        Command(
+            "robustify --blocks",
+            ("robustify", "{out}", "--sets", "40", *samples, "--blocks", "blocks"),
+            "out.tcs",
+            keeps=("blocks",),
+            changes=True,
+        ),
+        Command(
+            "population --blocks",
+            ("population", str(scores), *people, "--blocks", "blocks"),
+            "out.png",
+            keeps=("blocks",),
+        ),
     )
 
 
@@ -156,7 +169,8 @@ def leftovers(folder: Path, command: Command) -> set[Path]:
     return {
         path
         for path in (*folder.iterdir(), *(folder / "tmp").iterdir(), *kept)
-        if path.name not in (command.out, "tmp", "lock", "goals.json", *command.keeps)
+        if path.name
+        not in (command.out, "tmp", "lock", "goals.json", "manifest.json", *command.keeps)
         and path.suffix != ".block"
         and not (path.is_dir() and path in kept)
     }

@@ -207,10 +207,11 @@ def _read_plan(path: Path) -> Any:
 
 
 def _read_block(path: Path) -> Any:
-    from tcs.placement.scoring.blocks import FORMAT, Kept
+    from tcs.files.blocks import FORMAT, Blocks, load_block
+    from tcs.placement.scoring.blocks import Kept
 
-    content = FORMAT.load(path, dict)
-    kept = Kept(path.parent, str(content.get("key")), goals=3, joints=7, contacts=10_000)
+    blocks = Blocks(path.parent, load_block(path).key)
+    kept = Kept(blocks, goals=3, joints=7, contacts=10_000)
     return FORMAT.load(path, lambda inner: kept._decode(inner, 0, BLOCK))
 
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tcs.errors import TcsError
+    from tcs.files.blocks import BlockFolder
     from tcs.model.grid import InitialConfiguration
     from tcs.model.scene import Observation
     from tcs.motion import MotionPlan, examine, plan
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     __version__: str
 
 __all__ = [
+    "BlockFolder",
     "Choice",
     "Constraints",
     "Evaluation",
@@ -76,6 +78,7 @@ __all__ = [
 ]
 
 _HOMES = {
+    "BlockFolder": ("tcs.files.blocks", "BlockFolder"),
     "Choice": ("tcs.placement.selection", "Choice"),
     "Constraints": ("tcs.placement.constraints", "Constraints"),
     "Evaluation": ("tcs.placement.robustness", "Evaluation"),

@@ -14,13 +14,17 @@ from tcs.capability.arplace.files import load_arplace, load_probability_map
 from tcs.capability.files import FORMAT as CAPABILITY_MAP
 from tcs.capability.files import load_map
 from tcs.errors import StoreFormatError
+from tcs.files.blocks import FORMAT as BLOCK
+from tcs.files.blocks import MANIFEST, load_block, load_manifest
 from tcs.files.reader import read_joblib
 from tcs.placement.store import FORMAT as SCORES
 from tcs.placement.store import load_motions, load_scores
 from tcs.placement.store.motion_file import MOTION_FORMAT
 
 _WHAT = "File"
-_AGAIN = "Only files that tcs wrote can be checked: scores, motions, maps, models, plans, runs."
+_AGAIN = (
+    "Only files that tcs wrote can be checked: scores, motions, maps, models, plans, runs, blocks."
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +53,9 @@ def check_file(path: str | os.PathLike[str]) -> StoredFile:
     file is executed. That the answers are right is not checked: `tcs verify` does.
 
     Args:
-        path: A score file, motion file, capability map, ARPlace model, probability map, plan
-            (`.json`) or run of the teleoperated arm (`.csv`, `.parquet`).
+        path: A score file, motion file, capability map, ARPlace model, probability map, block of
+            `--blocks`, or `manifest.json` beside blocks (which are then all read), plan (`.json`)
+            or run of the teleoperated arm (`.csv`, `.parquet`).
 
     Raises:
         StoreError: If the file cannot be read.
@@ -60,6 +65,9 @@ def check_file(path: str | os.PathLike[str]) -> StoredFile:
         UnsafeStoreError: If it names an object outside the store's allow-list.
     """
     path = Path(path)
+    if path.name == MANIFEST:
+        load_manifest(path)
+        return StoredFile(str(path), "manifest of blocks", None, {})
     text = _TEXT_FILES.get(path.suffix)
     if text is not None:
         kind, load = text
@@ -108,6 +116,7 @@ _JOBLIB_FILES: Mapping[str, _Loader] = {
     CAPABILITY_MAP.name: ("capability map", load_map),
     ARPLACE_MODEL.name: ("ARPlace model", load_arplace),
     PROBABILITY_MAP.name: ("probability map", load_probability_map),
+    BLOCK.name: ("block", load_block),
 }
 _TEXT_FILES: Mapping[str, _Loader] = {
     ".json": ("plan", _load_plan),

@@ -14,6 +14,7 @@ PROMISED = [
     "Evaluation",
     "Explanation",
     "InitialConfiguration",
+    "BlockFolder",
     "LiveScorer",
     "MotionPlan",
     "Observation",

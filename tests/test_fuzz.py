@@ -89,6 +89,7 @@ def small_plan():
 
 def write_block(path, rows):
     """Write a block of random scores."""
+    from tcs.files.blocks import Blocks
     from tcs.placement.scoring.blocks import Block, Kept
 
     rng = np.random.default_rng(0)
@@ -100,7 +101,7 @@ def write_block(path, rows):
         np.where(reached, rng.random(reason.shape), 0.0).astype(np.float32),
         rng.random((np.count_nonzero(reached), 7)).astype(np.float32),
     )
-    Kept(path.parent, "key", goals=3, joints=7, contacts=10_000).save(0, block)
+    Kept(Blocks(path.parent, "key"), goals=3, joints=7, contacts=10_000).save(0, block)
     (path.parent / "0000000000.block").replace(path)
 
 

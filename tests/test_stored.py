@@ -5,7 +5,9 @@ import pytest
 
 from tcs.capability import save_map
 from tcs.capability.arplace import query, save_arplace, save_probability_map
-from tcs.errors import TcsError
+from tcs.errors import StoreFormatError, TcsError
+from tcs.files.blocks import FORMAT, MANIFEST, BlockFolder
+from tcs.files.compression import compress
 from tcs.files.joblib_file import write_joblib
 from tcs.placement.store import save_motions, save_scores
 from tcs.stored import check_file
@@ -17,6 +19,8 @@ from tests.placement.store.test_motion_file import motion_file, motion_table
 from tests.teleop.runs.test_files import made
 
 KINDS = {
+    "block": 1,
+    "manifest of blocks": None,
     "score file": 4,
     "motion file": 1,
     "capability map": 2,
@@ -29,6 +33,11 @@ KINDS = {
 def write(kind, folder):
     """Write a small file of a kind, under a name that says nothing; return its path."""
     path = folder / ("file.csv" if kind.startswith("run") else "file")
+    if kind in ("block", "manifest of blocks"):
+        with BlockFolder(folder / "blocks").opened("0123456789abcdef0") as blocks:
+            for name in ("first", "second"):
+                blocks.save(name, {"reason": compress(np.arange(40, dtype=np.uint8))})
+        return blocks.folder / (MANIFEST if kind.startswith("manifest") else "first.block")
     if kind == "score file":
         save_scores(path, score_file())
     elif kind == "motion file":
@@ -70,6 +79,23 @@ def test_every_changed_byte_and_every_cut_is_found(kind, tmp_path, rng):
         path.write_bytes(content[:place])
         with pytest.raises(TcsError):
             check_file(path)
+
+
+def test_missing_and_foreign_blocks_of_a_finished_run_are_found(tmp_path):
+    manifest = write("manifest of blocks", tmp_path)
+    first, second = sorted(manifest.parent.glob("*.block"))
+    whole = first.read_bytes()
+    for content in (second.read_bytes(), whole[:-1], None):
+        if content is None:
+            first.unlink()
+        else:
+            first.write_bytes(content)
+        with pytest.raises(StoreFormatError, match="block 'first'"):
+            check_file(manifest)
+    plain = FORMAT.load(second, dict)
+    FORMAT.save(first, {"key": plain["key"], "block": "first", "reason": {"bytes": 3}})
+    with pytest.raises(TcsError, match=r"first\.block"):
+        check_file(first)
 
 
 @pytest.mark.parametrize("content", [{}, {"format": []}, {"format": "tcs scores"}, [1]])

@@ -17,7 +17,8 @@ def check(
         list[Path],
         typer.Argument(
             metavar="FILE...",
-            help="Scores, motions, capability and probability maps, ARPlace models, plans, runs.",
+            help="Scores, motions, capability and probability maps, ARPlace models, plans, runs, "
+            "blocks (or manifest.json beside them, for all).",
         ),
     ],
     as_json: options.Json = False,

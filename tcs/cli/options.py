@@ -13,6 +13,7 @@ from tcs.cli.values import axis_values, observed_settings, state_if_given
 from tcs.files.quantities import DURATION, JOBS, QUERIES
 
 if TYPE_CHECKING:
+    from tcs.files.blocks import BlockFolder
     from tcs.model.grid import Axis, InitialConfiguration
     from tcs.placement.constraints import Constraints
     from tcs.placement.selection import Top, TravelWeights
@@ -91,6 +92,32 @@ Travel = Annotated[
         help="Path of the base: straight, as in the paper, or around the furniture.",
     ),
 ]
+
+
+Blocks = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FOLDER",
+        help="Keep finished blocks of the work in this folder: after an interrupt or a crash the "
+        "same command continues there.",
+    ),
+]
+Restart = Annotated[
+    bool, typer.Option("--restart", help="With --blocks: discard what was finished before.")
+]
+
+
+def block_folder(blocks: Path | None, restart: bool) -> BlockFolder | None:
+    """Return the folder of `--blocks` and `--restart`, None without one.
+
+    Raises:
+        typer.BadParameter: If there is nothing to restart.
+    """
+    from tcs.files.blocks import BlockFolder
+
+    if restart and blocks is None:
+        raise typer.BadParameter("requires --blocks.", param_hint="--restart")
+    return None if blocks is None else BlockFolder(blocks, restart)
 
 
 def axis_weight(default: str) -> typer.models.OptionInfo:

@@ -110,11 +110,14 @@ def population(
             help="Draw success over stature and abdominal depth: .png, .pdf or .svg.",
         ),
     ] = None,
+    blocks: options.Blocks = None,
+    restart: options.Restart = False,
     jobs: options.Jobs = 2,
     as_json: options.Json = False,
 ) -> None:
     """Count the people of a population whom the best sets serve: all goals are reached for them."""
     who.check()
+    kept = options.block_folder(blocks, restart)
     import tcs
     from tcs.output.terminal import population_tables
 
@@ -136,6 +139,7 @@ def population(
             seed=seed,
             table=table,
             jobs=jobs,
+            blocks=kept,
             on_progress=on_progress,
             on_compile=terminal.note_compiling,
         )

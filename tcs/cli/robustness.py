@@ -77,12 +77,15 @@ def evaluate(
     replan: Annotated[
         bool, typer.Option(help="Of a plan: whether motions are also planned anew in each sample.")
     ] = True,
+    blocks: options.Blocks = None,
+    restart: options.Restart = False,
     jobs: options.Jobs = 2,
     as_json: options.Json = False,
 ) -> None:
     """Evaluate the success of a set, or of a plan, in randomly perturbed environments."""
     if file.suffix == ".json":
-        if select != "best" or members or observed or check_base or body_collisions != "paper":
+        chosen = select != "best" or members or observed or blocks or restart
+        if chosen or check_base or body_collisions != "paper":
             raise typer.BadParameter(
                 "of a plan, only --samples, --seed, --errors and --no-replan can be set.",
                 param_hint="FILE",
@@ -91,6 +94,9 @@ def evaluate(
         return
     if members is not None and select not in ("uniform", "equal"):
         raise typer.BadParameter("requires --select uniform or equal.", param_hint="--members")
+    if blocks is not None and select == "refined":
+        raise typer.BadParameter("is not for refined sets.", param_hint="--blocks")
+    kept = options.block_folder(blocks, restart)
     import tcs
 
     loaded = tcs.load(file)
@@ -121,6 +127,7 @@ def evaluate(
             table=table,
             body_collisions="all" if check_base else body_collisions,
             jobs=jobs,
+            blocks=kept,
             on_progress=on_progress,
             on_compile=terminal.note_compiling,
         )
@@ -143,6 +150,8 @@ def robustify(
     observed: options.Observed = None,
     body_collisions: _BodyCollisions = "paper",
     check_base: _CheckBase = False,
+    blocks: options.Blocks = None,
+    restart: options.Restart = False,
     jobs: options.Jobs = 2,
     as_json: options.Json = False,
 ) -> None:
@@ -155,6 +164,7 @@ def robustify(
     from tcs.placement.robustness import success_summary
 
     path = out or file
+    kept = options.block_folder(blocks, restart)
     check_writable(path)
     loaded = tcs.load(file)
     table = table_of(loaded, observed)
@@ -168,6 +178,7 @@ def robustify(
             body_collisions="all" if check_base else body_collisions,
             tables=None if table is None else [table],
             jobs=jobs,
+            blocks=kept,
             on_progress=on_progress,
             on_compile=terminal.note_compiling,
         )

@@ -120,17 +120,8 @@ def score(
     ] = None,
     at: options.At = None,
     person: options.Person = None,
-    blocks: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER",
-            help="Keep finished blocks of the grid in this folder: after an interrupt or a crash "
-            "the same command continues there.",
-        ),
-    ] = None,
-    restart: Annotated[
-        bool, typer.Option("--restart", help="With --blocks: discard what was finished before.")
-    ] = False,
+    blocks: options.Blocks = None,
+    restart: options.Restart = False,
     engine: Annotated[
         str,
         typer.Option(help="Who scores: threads, processes, or dask for the workers of a cluster."),
@@ -165,8 +156,7 @@ def score(
         )
     if tool and (everything or arms):
         raise typer.BadParameter("is for one task and one arm.", param_hint="--tool")
-    if restart and blocks is None:
-        raise typer.BadParameter("requires --blocks.", param_hint="--restart")
+    kept = options.block_folder(blocks, restart)
     if blocks and (observed or frames):
         raise typer.BadParameter("is not for an observed environment.", param_hint="--blocks")
     if refine and (approach or dry_run or observed or frames):
@@ -187,12 +177,12 @@ def score(
 
     from tcs.cli.values import person_values, settings
     from tcs.model.checkup.quick import quick_problems
-    from tcs.placement.scoring import BlockFolder, default_path, files
+    from tcs.placement.scoring import default_path, files
     from tcs.placement.scoring.engines import engine_named
 
     offline: dict[str, Any] = {
         "arms": arms,
-        "blocks": None if blocks is None else BlockFolder(blocks, restart),
+        "blocks": kept,
         "engine": engine_named(engine, jobs=jobs, scheduler=scheduler),
     }
     scoring_options: dict[str, Any] = {

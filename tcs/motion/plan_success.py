@@ -23,7 +23,8 @@ from tcs.motion.plans import value_of
 from tcs.motion.stop_tour import plan_stop
 from tcs.motion.stops import Stop, StopGrid, single_grid
 from tcs.placement.robustness import ErrorModel, Mean, mean_of
-from tcs.placement.robustness.trials import Errors, Progress, displaced
+from tcs.placement.robustness.displacements import displaced
+from tcs.placement.robustness.trials import Errors, Progress
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.rebuild import rebuild_made_from
 

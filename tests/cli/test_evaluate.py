@@ -183,3 +183,36 @@ def test_an_interrupt_ends_in_one_line_and_leaves_the_file(stored, tmp_path):
     assert err == "tcs: interrupted; no half-written file is left.\n"
     assert path.read_bytes() == stored.read_bytes()
     assert sorted(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("evaluate", "{file}", "--samples", "20"),
+        ("robustify", "{file}", "--samples", "8", "--sets", "8", "--out", "{out}"),
+        ("population", "{file}", "--bodies", "3", "--sets", "1"),
+    ],
+    ids=lambda words: words[0],
+)
+def test_blocks_are_kept_and_taken(words, tcs_command, stored, tmp_path):
+    words = [word.format(file=stored, out=tmp_path / "out.tcs") for word in words]
+    first = without_time(tcs_command(*words, "--json").json)
+    blocks = tmp_path / "blocks"
+    for more in ((), (), ("--restart",)):
+        ran = tcs_command(*words, "--blocks", blocks, *more, "--json")
+        assert without_time(ran.json) == first
+    (manifest,) = blocks.rglob("manifest.json")
+    assert tcs_command("check", manifest, *blocks.rglob("*.block")).code == 0
+    ran = tcs_command(*words, "--restart")
+    assert ran.code == 2
+    assert "requires --blocks" in " ".join(ran.err.replace("│", " ").split())
+
+
+def without_time(result):
+    return {key: value for key, value in result.items() if key != "seconds"}
+
+
+def test_blocks_are_not_for_refined_sets(tcs_command, stored, tmp_path):
+    ran = tcs_command("evaluate", stored, "--select", "refined", "--blocks", tmp_path / "blocks")
+    assert ran.code == 2
+    assert "not for refined sets" in " ".join(ran.err.replace("│", " ").split())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -17,6 +18,7 @@ from tcs.kernel.sweep import gripper_contacts
 from tcs.model.people import Scale
 from tcs.model.scene import PeopleInScene, SceneSpec
 from tcs.model.tasks import load_task
+from tcs.placement.population.kept_people import BLOCK, PROBES, KeptPeople
 from tcs.placement.population.problems import PersonProblems
 from tcs.placement.robustness.body_collisions import counted_pairs
 from tcs.placement.robustness.error_model import Offsets
@@ -33,7 +35,7 @@ Reasons = NDArray[np.uint8]
 
 
 class _Prepared(NamedTuple):
-    """One arm's scene for a chunk of people."""
+    """One arm's scene for some people."""
 
     scenes: PeopleInScene
     problems: PersonProblems
@@ -82,17 +84,60 @@ def reasons_for_people(
         raise TcsError(f"jobs is {jobs}; must be 1 or more threads.")
     poses = trials.poses(members)
     found = np.empty((poses.state.size, len(scales), trials.weights.size), np.uint8)
+    kept = _kept(trials, poses, scales, offsets)
+    done = 0
+
+    def step(people: int) -> None:
+        nonlocal done
+        done += people
+        if on_progress is not None:
+            on_progress(done, len(scales))
+
     for first in range(0, len(scales), CHUNK):
         columns = np.arange(first, min(first + CHUNK, len(scales)))
+        missing = []
+        for block in (columns[i : i + BLOCK] for i in range(0, columns.size, BLOCK)):
+            before = None if kept is None else kept.load(block)
+            if before is None:
+                missing.append(block)
+                continue
+            found[:, block] = before
+            step(block.size)
+        if not missing:
+            continue
         prepared = list(_prepared(trials, poses, scales, columns, offsets))
-        batches = [columns[i : i + BATCH] for i in range(0, columns.size, BATCH)]
+        batches = [block[i : i + BATCH] for block in missing for i in range(0, block.size, BATCH)]
         parallel = Parallel(n_jobs=jobs, prefer="threads", return_as="generator")
         work = (delayed(_evaluated)(prepared, scales, batch, first) for batch in batches)
         for batch, reasons in zip(batches, parallel(work), strict=True):
             found[:, batch] = reasons
-            if on_progress is not None:
-                on_progress(int(batch[-1]) + 1, len(scales))
+            if batch[-1] == missing[0][-1]:
+                block = missing.pop(0)
+                if kept is not None:
+                    kept.save(block, found[:, block])
+            step(batch.size)
     return found
+
+
+def _kept(
+    trials: Trials,
+    poses: BasePoses,
+    scales: Sequence[dict[str, Scale]],
+    offsets: Offsets | None,
+) -> KeptPeople | None:
+    """Return the blocks of the configurations for the people; None if the trials keep none."""
+    if trials.blocks is None or not scales:
+        return None
+    some = np.arange(min(PROBES, len(scales)))
+    seen = hashlib.sha256()
+    for arm in _prepared(trials, poses, scales, some, offsets):
+        for arrays in arm.scenes.arrays_of([scales[i] for i in some.tolist()], arm.states):
+            seen.update(
+                dataclasses.replace(trials.arms[0].lowered, arrays=arrays).digest().encode()
+            )
+    return KeptPeople.of(
+        trials.blocks, poses, scales, offsets, scenes=seen.hexdigest(), goals=trials.weights.size
+    )
 
 
 def _with_papers_man(arm: ArmTrials, trials: Trials) -> ArmTrials:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from tcs.errors import SelectionError
+from tcs.files.blocks import BlockFolder
 from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
 from tcs.model.people import Bodies, scales_of_people
 from tcs.placement.population.differences import Difference, Part, ranking, tree
@@ -214,6 +215,7 @@ def population(
     seed: int = 0,
     table: int | None = None,
     jobs: int = 2,
+    blocks: BlockFolder | None = None,
     on_progress: Progress = None,
     on_compile: Callable[[], None] | None = None,
 ) -> Population:
@@ -234,6 +236,8 @@ def population(
         seed: Seed of these errors.
         table: Number of the file's table; by default the nominal one.
         jobs: Number of threads; the result does not depend on it.
+        blocks: Folder in which finished blocks are kept, so that the same call continues after an
+            interrupt; None to keep none.
         on_progress: Called with the number of people done and of all.
         on_compile: Called first if the kernel has to be compiled.
 
@@ -246,6 +250,7 @@ def population(
         DataFileError: If the measures of a person contradict each other, or the error file cannot
             be used.
         SelectionError: If there is no set, or no such table.
+        OutputError: If blocks cannot be kept in their folder, or another process is at work there.
         TcsError: If a number is out of range.
     """
     begun = time.perf_counter()
@@ -261,9 +266,10 @@ def population(
     choices = _best_sets(file, trials, top)
     offsets = trials.errors.draw(len(people), seed, stream=STREAM) if is_perturbed else None
     members = np.unique(np.concatenate([choice.indices for choice in choices]))
-    reasons = reasons_for_people(
-        trials, members, scales_of_people(people), offsets, jobs=jobs, on_progress=on_progress
-    )
+    with trials.kept_in(blocks) as kept:
+        reasons = reasons_for_people(
+            kept, members, scales_of_people(people), offsets, jobs=jobs, on_progress=on_progress
+        )
     blocked = np.asarray((reasons == Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT).all(axis=0))
     sets = tuple(_set_for_people(choice, members, reasons, trials) for choice in choices)
     return Population(

@@ -13,7 +13,8 @@ from tcs.placement.refinement.members import refined_table
 from tcs.placement.refinement.perturbed import PerturbedPoints
 from tcs.placement.refinement.points import Points
 from tcs.placement.robustness import Evaluation, Trials
-from tcs.placement.robustness.trials import Errors, displaced
+from tcs.placement.robustness.displacements import displaced
+from tcs.placement.robustness.trials import Errors
 from tcs.placement.store import ScoreFile, state_to_json
 
 

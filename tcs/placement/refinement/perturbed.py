@@ -17,9 +17,10 @@ from tcs.kernel.sweep import blocked_grippers, gripper_contacts
 from tcs.model.grid import ROBOT_AXES
 from tcs.model.scene import environment_at, torso_at
 from tcs.placement.refinement.points import Points
+from tcs.placement.robustness.displacements import displaced, samples_of
 from tcs.placement.robustness.error_model import Offsets
 from tcs.placement.robustness.perturbed_scenes import BasePoses, PerturbedScenes, Run
-from tcs.placement.robustness.trials import ArmTrials, Trials, displaced, samples_of
+from tcs.placement.robustness.trials import ArmTrials, Trials
 from tcs.placement.tables import Reason
 
 BATCH = 50

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import TcsError
+from tcs.files.blocks import BlockFolder
 from tcs.model.grid import Grid
 from tcs.model.random_streams import check_draws
 from tcs.placement.robustness.pairs import EQUAL_REACHABILITY, Pairs, kept_pairs
@@ -46,6 +47,7 @@ def robustify(
     body_collisions: str = "paper",
     tables: Sequence[int] | None = None,
     jobs: int = 2,
+    blocks: BlockFolder | None = None,
     on_progress: Progress = None,
     on_compile: Callable[[], None] | None = None,
 ) -> ScoreFile:
@@ -65,6 +67,8 @@ def robustify(
         body_collisions: Collisions of the robot's body that count, one of `BODY_COLLISIONS`.
         tables: Numbers of the tables; all by default. The others keep their estimates.
         jobs: Number of threads.
+        blocks: Folder in which finished blocks are kept, so that the same call continues after an
+            interrupt; None to keep none.
         on_progress: Called with the number of rounds done and of all rounds.
         on_compile: Called first if the kernel has to be compiled.
 
@@ -73,6 +77,7 @@ def robustify(
         DataFileError: If the error file cannot be used.
         UnknownNameError: If a joint or a choice of collisions has no such name.
         SelectionError: If there is no such table.
+        OutputError: If blocks cannot be kept in their folder, or another process is at work there.
         TcsError: If a number is out of range.
     """
     check_draws(samples, seed)
@@ -90,10 +95,11 @@ def robustify(
             on_progress(done, total)
 
     scored = list(file.tables)
-    for number in chosen:
-        here = trials.at_table(number)
-        success = success_of(here, sets=sets, samples=samples, seed=seed, jobs=jobs, step=step)
-        scored[number] = dataclasses.replace(here.scored, success=success)
+    with trials.kept_in(blocks) as kept:
+        for number in chosen:
+            here = kept.at_table(number)
+            success = success_of(here, sets=sets, samples=samples, seed=seed, jobs=jobs, step=step)
+            scored[number] = dataclasses.replace(here.scored, success=success)
     settings = {
         "program_version": version("tcs"),
         "samples": samples,

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import SelectionError, TcsError, UnknownNameError
+from tcs.files.blocks import BlockFolder
 from tcs.model.random_streams import check_draws
 from tcs.placement.robustness.error_model import ErrorModel, Offsets
 from tcs.placement.robustness.pairs import EQUAL_REACHABILITY, uniform_sets
@@ -129,6 +130,7 @@ def evaluate(
     body_collisions: str | None = None,
     stream: str = "",
     jobs: int = 2,
+    blocks: BlockFolder | None = None,
     on_progress: Progress = None,
     on_compile: Callable[[], None] | None = None,
 ) -> Evaluation:
@@ -151,6 +153,8 @@ def evaluate(
             default `paper`. Not for trials.
         stream: Name of the draw; another name gives independent samples.
         jobs: Number of threads.
+        blocks: Folder in which finished blocks are kept, so that the same call continues after an
+            interrupt; None to keep none.
         on_progress: Called with the number of evaluated pairs of configuration and sample, and of
             all such pairs.
         on_compile: Called first if the kernel has to be compiled.
@@ -163,6 +167,7 @@ def evaluate(
         UnknownNameError: If a joint, a selection or a choice of collisions has no such name.
         DataFileError: If the error file cannot be used.
         SelectionError: If there is no set to evaluate.
+        OutputError: If blocks cannot be kept in their folder, or another process is at work there.
         TcsError: If a number is out of range.
 
     Source:
@@ -190,13 +195,14 @@ def evaluate(
     offsets = trials.errors.draw(samples, seed, stream=stream)
     sets, choices = _chosen(trials.scored, select, members, samples, seed)
     is_drawn = isinstance(select, str) and select in _DRAWN
-    if is_drawn:
-        # Set i is evaluated on sample i only, with all of its members.
-        tiled = {name: np.tile(values, sets.shape[1]) for name, values in offsets.items()}
-        found = trials.reached_each(sets.T.ravel(), tiled, jobs=jobs, on_progress=on_progress)
-        found = found.reshape(sets.shape[1], samples, -1)
-    else:
-        found = trials.reached(sets[0], offsets, jobs=jobs, on_progress=on_progress)
+    with trials.kept_in(blocks) as kept:
+        if is_drawn:
+            # Set i is evaluated on sample i only, with all of its members.
+            tiled = {name: np.tile(values, sets.shape[1]) for name, values in offsets.items()}
+            found = kept.reached_each(sets.T.ravel(), tiled, jobs=jobs, on_progress=on_progress)
+            found = found.reshape(sets.shape[1], samples, -1)
+        else:
+            found = kept.reached(sets[0], offsets, jobs=jobs, on_progress=on_progress)
     reached: NDArray[np.bool_] = np.logical_or.reduce(found, axis=0)
     scores = np.array([trials.scored.sets.scores_of(tuple(map(int, row))) for row in sets])
     for array in (sets, reached, *offsets.values()):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tcs.errors import SelectionError, TcsError
+from tcs.files.blocks import BlockFolder, Blocks, opened_if
 from tcs.kernel.arrays import BoolArray, FloatArray, GridArrays, IntArray
 from tcs.kernel.problem import build_problem
 from tcs.kernel.scores import Scores
@@ -20,7 +22,9 @@ from tcs.kernel.sweep import gripper_contacts
 from tcs.model.grid import Grid
 from tcs.model.scene import ErrorDistribution, LoweredScene, Scene, environment_at
 from tcs.placement.robustness.body_collisions import check_body_collisions, counted_pairs
+from tcs.placement.robustness.displacements import displaced, samples_of
 from tcs.placement.robustness.error_model import ErrorModel, Offsets
+from tcs.placement.robustness.kept_runs import kept_runs, states_digest, trials_key
 from tcs.placement.robustness.perturbed_scenes import BATCH, BasePoses, PerturbedScenes, Run
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.rebuild import rebuild_scene
@@ -62,15 +66,21 @@ class ArmTrials:
             measure: Name of the dexterity measure.
         """
         samples = samples_of(positions)
-        states = (
-            {name: float(values[i]) for name, values in positions.items()} for i in range(samples)
-        )
-        arrays = environment_at(lowered, self.scene, self.job.task, states)
+        arrays = environment_at(lowered, self.scene, self.job.task, _states(positions))
         arrays = arrays._replace(body_vs_environment=self.body_pairs)
         origin = np.zeros(1)
         grid = GridArrays(samples, origin, origin, origin, len(arrays.arm_base_p))
         problem = build_problem(arrays, grid, measure)
         return PerturbedScenes(problem, gripper_contacts(problem))
+
+    def arrays_digest(self, positions: Mapping[str, FloatArray]) -> str:
+        """Return the hash of the scene with its environment in other states.
+
+        Args:
+            positions: Joint positions in each state [m or rad], shapes (states,).
+        """
+        arrays = environment_at(self.lowered, self.scene, self.job.task, _states(positions))
+        return dataclasses.replace(self.lowered, arrays=arrays).digest()
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +103,8 @@ class Trials:
     """The robot with each arm that configurations use, in the order of the grid."""
     compile_seconds: float
     """Time for compiling the kernel or loading its machine code [s]."""
+    blocks: Blocks | None = None
+    """Where the goals that are reached are kept; None to keep none."""
 
     @classmethod
     def of(
@@ -162,6 +174,22 @@ class Trials:
         """Return the trials of another table of the same file."""
         return dataclasses.replace(self, table=table)
 
+    @contextmanager
+    def kept_in(self, folder: BlockFolder | None) -> Iterator[Trials]:
+        """Yield trials that keep the goals that are reached in a folder; themselves without one.
+
+        Raises:
+            OutputError: If the folder cannot be made, or another process is at work there.
+        """
+        with opened_if(folder, lambda: self.key) as blocks:
+            yield dataclasses.replace(self, blocks=blocks) if blocks is not None else self
+
+    @property
+    def key(self) -> str:
+        """Hash of what the trials of all tables follow from, but for the errors."""
+        arms = ((arm.lowered, arm.body_pairs) for arm in self.arms)
+        return trials_key(arms, self._measure)
+
     @property
     def scored(self) -> StateTables:
         """Scores and sets of the table."""
@@ -230,13 +258,13 @@ class Trials:
             rows = np.flatnonzero(poses.state == state)
             for first in range(0, samples, CHUNK):
                 columns = np.arange(first, min(first + CHUNK, samples))
-                scenes = self._scenes(int(state), offsets, columns)
                 runs = [
                     Run(int(row), start, min(start + BATCH, columns.size))
                     for row in rows
                     for start in range(0, columns.size, BATCH)
                 ]
-                for run, found in scenes.reached(poses, runs, jobs):
+                samples_here = _part(offsets, columns)
+                for run, found in self._found(int(state), samples_here, poses, runs, jobs):
                     out[run.row, columns[run.start : run.stop]] = found
                     step(len(found))
         return out
@@ -276,9 +304,9 @@ class Trials:
             rows = np.flatnonzero(poses.state == state)
             for first in range(0, rows.size, CHUNK):
                 part = rows[first : first + CHUNK]
-                scenes = self._scenes(int(state), offsets, part)
                 runs = [Run(int(row), i, i + 1) for i, row in enumerate(part)]
-                for run, found in scenes.reached(poses, runs, jobs):
+                samples_here = _part(offsets, part)
+                for run, found in self._found(int(state), samples_here, poses, runs, jobs):
                     out[run.row] = found[0]
                     step(1)
         return out
@@ -290,9 +318,8 @@ class Trials:
             GridError: If there is no such configuration.
         """
         poses = self.poses([member])
-        columns = np.arange(samples_of(offsets))
-        scenes = self._scenes(int(poses.state[0]), offsets, columns)
-        return scenes.scores(poses, Run(0, 0, columns.size))
+        scenes = self._scenes(int(poses.state[0]), offsets)
+        return scenes.scores(poses, Run(0, 0, samples_of(offsets)))
 
     def solutions(
         self, member: int, offsets: Offsets
@@ -362,55 +389,40 @@ class Trials:
         arm = self.arms[0]
         return displaced(arm.job, arm.scene, self.nominal(state), offsets)
 
-    def _scenes(
-        self,
-        state: int,
-        offsets: Offsets,
-        columns: IntArray,
-    ) -> PerturbedScenes:
-        """Return one state of the environment, with its arm, in some of the samples, as arrays."""
-        positions, _ = self.positions(state, {name: v[columns] for name, v in offsets.items()})
+    @property
+    def _measure(self) -> str:
+        return str(self.file.metadata["measure"])
+
+    def _scenes(self, state: int, offsets: Offsets) -> PerturbedScenes:
+        """Return one state of the environment, with its arm, in each sample, as arrays."""
+        positions, _ = self.positions(state, offsets)
         arm = self.arm_of(state * self.grid.state_size)
-        return arm.scenes(positions, arm.lowered, str(self.file.metadata["measure"]))
+        return arm.scenes(positions, arm.lowered, self._measure)
 
-
-def displaced(
-    job: Job, scene: Scene, nominal: Mapping[str, float], offsets: Offsets
-) -> tuple[dict[str, FloatArray], NDArray[np.bool_]]:
-    """Return joint positions in each sample, and whether a joint was held at its limit.
-
-    Args:
-        job: Robot and environment.
-        scene: Its live scene.
-        nominal: Positions without error, by joint [m or rad]; other joints are where the
-            environment file has them.
-        offsets: Errors of the joints, shapes (samples,).
-    """
-    samples = samples_of(offsets)
-    positions = {name: np.full(samples, value) for name, value in nominal.items()}
-    limited = np.zeros(samples, dtype=np.bool_)
-    for name, error in offsets.items():
-        center = nominal.get(name, scene.built.environment_joints.default(name))
-        lower, upper = scene.built.environment_joints.limits(name)
-        # Rounding may put the last grid value beyond the limit, where it must remain.
-        moved = center + np.asarray(error, dtype=np.float64)
-        positions[name] = np.clip(moved, min(lower, center), max(upper, center))
-        limited |= positions[name] != moved
-    return positions, limited
-
-
-def samples_of(offsets: Offsets) -> int:
-    """Return the number of samples.
-
-    Raises:
-        TcsError: If the joints have different numbers of samples, or there is no joint.
-    """
-    sizes = {len(values) for values in offsets.values()}
-    if len(sizes) != 1:
-        raise TcsError(
-            "Errors must be given for at least one joint, with the same number of samples for each."
+    def _found(
+        self, state: int, offsets: Offsets, poses: BasePoses, runs: list[Run], jobs: int
+    ) -> Iterator[tuple[Run, BoolArray]]:
+        """Yield the goals that each run reaches in one state of the environment."""
+        if self.blocks is None:
+            yield from self._scenes(state, offsets).reached(poses, runs, jobs)
+            return
+        positions, _ = self.positions(state, offsets)
+        number = state * self.grid.state_size // self.grid.arm_size
+        states = states_digest(number, positions, self.arms[number].arrays_digest)
+        yield from kept_runs(
+            self.blocks, states, lambda: self._scenes(state, offsets), poses, runs, jobs
         )
-    return sizes.pop()
+
+
+def _part(offsets: Offsets, columns: IntArray) -> Offsets:
+    """Return the errors in some of the samples."""
+    return {name: values[columns] for name, values in offsets.items()}
+
+
+def _states(positions: Mapping[str, FloatArray]) -> Iterator[dict[str, float]]:
+    """Yield the positions of the joints in each state, by name."""
+    for i in range(samples_of(positions)):
+        yield {name: float(values[i]) for name, values in positions.items()}
 
 
 def _counter(total: int, on_progress: Progress) -> Callable[[int], None]:

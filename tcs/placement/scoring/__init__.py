@@ -6,7 +6,7 @@ Out: a score file, and its verification.
 
 from __future__ import annotations
 
-from tcs.placement.scoring.blocks import BlockFolder
+from tcs.files.blocks import BlockFolder
 from tcs.placement.scoring.catalogue import default_path, task_environment_pairs
 from tcs.placement.scoring.job import Job, load_job
 from tcs.placement.scoring.live import LiveScorer, score_observed

@@ -1,13 +1,8 @@
-"""Blocks of a grid, kept in a folder as soon as they are scored, so that a killed run continues."""
+"""Blocks of a grid: what is kept of consecutive configurations, and what it follows from."""
 
 from __future__ import annotations
 
-import contextlib
-import fcntl
 import hashlib
-import logging
-import os
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,25 +10,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.errors import OutputError, StoreFormatError, TcsError
+from tcs.errors import StoreFormatError
+from tcs.files.blocks import FORMAT, Blocks
 from tcs.files.compression import AtMost, compress, decompress
-from tcs.files.joblib_file import JoblibFormat
-from tcs.files.writing import make_folder, remove_leftovers
 from tcs.kernel import cache
 from tcs.model.scene import LoweredScene
 from tcs.placement.tables import Reason
 
-_log = logging.getLogger(__name__)
-
 BLOCK = 32 * 1024
 """Configurations of a block: a second of work or less, and files of a megabyte."""
-
-FORMAT = JoblibFormat(
-    what="Block of scores",
-    name="tcs block",
-    version=1,
-    again="It is scored again.",
-)
 
 
 class Block(NamedTuple):
@@ -53,9 +38,8 @@ class Block(NamedTuple):
 class Kept:
     """The blocks of one grid in its folder."""
 
-    folder: Path
-    key: str
-    """Hash of everything that the scores follow from."""
+    blocks: Blocks
+    """The folder, under the hash of everything that the scores follow from."""
     goals: int
     joints: int
     contacts: int
@@ -66,18 +50,11 @@ class Kept:
 
         A damaged block, or one of other inputs, is told in a warning.
         """
-        path = self._path(start)
-        if not path.exists():
-            return None
-        try:
-            return FORMAT.load(path, lambda content: self._decode(content, start, stop))
-        except TcsError as error:
-            _log.warning("%s", error)
-            return None
+        return self.blocks.load(_name(start), lambda content: self._decode(content, start, stop))
 
     def has(self, start: int) -> bool:
         """Return whether there is a file of the block from a configuration on."""
-        return self._path(start).exists()
+        return self.blocks.has(_name(start))
 
     def save(self, start: int, block: Block) -> None:
         """Write a block, completely or not at all.
@@ -86,18 +63,13 @@ class Kept:
             OutputError: If it cannot be written.
         """
         arrays = {name: compress(values) for name, values in self._stored(block).items()}
-        FORMAT.save(self._path(start), {"key": self.key, "start": start, **arrays})
-
-    def _path(self, start: int) -> Path:
-        return self.folder / f"{start:010d}.block"
+        self.blocks.save(_name(start), arrays)
 
     def _stored(self, block: Block) -> dict[str, NDArray[Any]]:
         # Arrays are stored without a sign.
         return {**block._asdict(), "contact": (block.contact + 1).astype(np.uint32)}
 
     def _decode(self, content: dict[str, Any], start: int, stop: int) -> Block:
-        if content.get("key") != self.key or content.get("start") != start:
-            raise StoreFormatError("is of another run")
         shape = (stop - start, self.goals)
         reason = decompress(content, "reason", "u1", shape)
         contact = decompress(content, "contact", "u4", shape).astype(np.int64) - 1
@@ -108,6 +80,11 @@ class Kept:
             raise StoreFormatError("has joints for other pairs than are reached")
         dexterity = decompress(content, "dexterity", "f4", shape)
         return Block(reason, contact.astype(np.int32), dexterity, joints)
+
+
+def _name(start: int) -> str:
+    """Return the name of the block from a configuration on."""
+    return f"{start:010d}"
 
 
 def key_of(lowered: LoweredScene, measure: str, excluded: NDArray[np.bool_] | None) -> str:
@@ -123,72 +100,3 @@ def key_of(lowered: LoweredScene, measure: str, excluded: NDArray[np.bool_] | No
     if excluded is not None:
         sha.update(np.packbits(excluded).tobytes())
     return sha.hexdigest()
-
-
-@dataclass(frozen=True, slots=True)
-class BlockFolder:
-    """Folder of finished blocks; runs with other inputs have folders of their own inside it."""
-
-    path: Path
-    restart: bool = False
-    """Whether to discard the finished blocks of the same inputs."""
-
-    @contextlib.contextmanager
-    def opened(self, key: str, *, goals: int, joints: int, contacts: int) -> Iterator[Kept]:
-        """Yield the blocks of the inputs with a key, locked for this process.
-
-        Args:
-            key: Of `key_of`.
-            goals: Number of goals.
-            joints: Number of joints of the arm.
-            contacts: Number of contact codes.
-
-        Raises:
-            OutputError: If the folder cannot be made, or another process is at work on the same
-                inputs in it.
-        """
-        folder = self.path / key[:16]
-        make_folder(folder, "Folder of blocks")
-        with _locked(folder / "lock"):
-            remove_leftovers(folder)
-            if self.restart:
-                for block in folder.glob("*.block"):
-                    block.unlink()
-            yield Kept(folder, key, goals, joints, contacts)
-
-
-@contextlib.contextmanager
-def _locked(path: Path) -> Iterator[None]:
-    """Lock a file for this process, and write the process's number into it.
-
-    Raises:
-        OutputError: If another process has locked it, or it cannot be written.
-    """
-
-    def unwritable(error: OSError) -> OutputError:
-        return OutputError(
-            f"Folder of blocks '{path.parent}' cannot be written: {error.strerror}. "
-            "Name another folder."
-        )
-
-    try:
-        # Without a buffer, which a full disk would keep from being closed.
-        stream = path.open("a+b", buffering=0)
-    except OSError as error:
-        raise unwritable(error) from error
-    with stream:
-        try:
-            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            stream.seek(0)
-            process = stream.read(20).decode(errors="replace").strip() or "unknown"
-            raise OutputError(
-                f"Folder of blocks '{path.parent}' is in use by process {process}, which scores "
-                "the same. Wait for it, or name another folder."
-            ) from None
-        try:
-            stream.truncate(0)
-            stream.write(str(os.getpid()).encode())
-        except OSError as error:
-            raise unwritable(error) from error
-        yield

@@ -11,6 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Self, Unpack
 
+from tcs.files.blocks import BlockFolder
 from tcs.kernel.dexterity import DEFAULT_MEASURE, dexterity
 from tcs.model.grid import Grid
 from tcs.model.people import PersonLike
@@ -25,7 +26,6 @@ from tcs.placement.constraints import (
 )
 from tcs.placement.scoring.approaches import approach_entry, approach_lines
 from tcs.placement.scoring.arms import score_arms
-from tcs.placement.scoring.blocks import BlockFolder
 from tcs.placement.scoring.engines import ScoringEngine
 from tcs.placement.scoring.job import Job, data_references, load_job
 from tcs.placement.scoring.person import person_entry

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import StoreFormatError
+from tcs.files.blocks import Blocks
 from tcs.files.reading import read_text
 from tcs.files.writing import whole_file
 from tcs.model.scene import LoweredScene
@@ -110,14 +111,14 @@ class Shared:
         """
         best: Self | None = None
         for path in sorted(folder.iterdir()):
-            other = None if path == kept.folder else Manifest.load(path)
+            other = None if path == kept.blocks.folder else Manifest.load(path)
             if other is None or other.rest != manifest.rest:
                 continue
             number = {goal: i for i, goal in enumerate(other.goals)}
             mine = tuple(i for i, goal in enumerate(manifest.goals) if goal in number)
             if mine and (best is None or len(mine) > len(best.mine)):
                 theirs = tuple(number[manifest.goals[i]] for i in mine)
-                blocks = replace(kept, folder=path, key=other.key, goals=len(other.goals))
+                blocks = replace(kept, blocks=Blocks(path, other.key), goals=len(other.goals))
                 missing = tuple(i for i in range(len(manifest.goals)) if i not in mine)
                 best = cls(blocks, theirs, mine, missing)
         return best

@@ -13,6 +13,7 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from tcs.errors import TcsError
+from tcs.files.blocks import BlockFolder
 from tcs.files.mapped import chunks, large_zeros, release
 from tcs.kernel.analytic.solver import is_outside
 from tcs.kernel.cache import is_compiled
@@ -26,7 +27,7 @@ from tcs.placement.scoring.approaches import (
     score_with_approach,
     warm_up_approaches,
 )
-from tcs.placement.scoring.blocks import BLOCK, Block, BlockFolder, Kept
+from tcs.placement.scoring.blocks import BLOCK, Block, Kept
 from tcs.placement.scoring.engines import Part, ScoringEngine, Threads, Work
 from tcs.placement.scoring.engines.work import JOINTS
 from tcs.placement.scoring.shared_blocks import Manifest, Shared, joined, with_goals
@@ -219,8 +220,9 @@ def _opened(
         return
     manifest = manifest_of()
     goals = problem.goal_p.shape[1]
-    with blocks.opened(manifest.key, goals=goals, joints=JOINTS, contacts=_codes(problem)) as kept:
-        manifest.save(kept.folder)
+    with blocks.opened(manifest.key) as opened:
+        manifest.save(opened.folder)
+        kept = Kept(opened, goals=goals, joints=JOINTS, contacts=_codes(problem))
         shared = None if blocks.restart else Shared.found(blocks.path, manifest, kept)
         yield _Found(kept, shared)
 

@@ -9,8 +9,8 @@ import pytest
 
 from tcs.errors import OutputError
 from tcs.files import mapped
+from tcs.files.blocks import FORMAT, BlockFolder
 from tcs.files.compression import compress
-from tcs.placement.scoring.blocks import FORMAT, BlockFolder
 from tcs.placement.scoring.engines import Work
 from tcs.placement.scoring.shared_blocks import with_goals
 from tcs.placement.scoring.sweep import sweep
@@ -165,7 +165,7 @@ def test_a_second_run_on_the_same_blocks_is_refused_with_the_process(run, tmp_pa
     run()
     (folder,) = (tmp_path / "blocks").iterdir()
     with (
-        BlockFolder(tmp_path / "blocks").opened(folder.name, goals=1, joints=7, contacts=1),
+        BlockFolder(tmp_path / "blocks").opened(folder.name),
         pytest.raises(OutputError, match=f"is in use by process {os.getpid()}"),
     ):
         run()
