@@ -33,6 +33,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "planning": ("--limit", "20", "--compared", "1", "--seeds", "20"),
     "service": (f"{SCORES}/shaving-wheelchair-pr2.tcs",),
     "ros2": (f"{SCORES}/shaving-wheelchair-pr2.tcs",),
+    "app": (f"{SCORES}/shaving-wheelchair-pr2.tcs",),
     "approach": (
         *("--rows", "shaving/wheelchair", "feeding/wheelchair", "bathing/bed"),
         *("--pairs", "100"),

@@ -104,7 +104,7 @@ def plan(
     else:
         shown = ShownSet.of(loaded, state, max_members, settings)
         members = shown.refined or _flat_indices(loaded, shown.table, shown.indices)
-    with terminal.progress_bar("stops") as on_progress:
+    with terminal.progress_bar("per cent") as on_progress:
         found = tcs.plan(
             loaded,
             members,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,8 @@ from tcs.placement.tables import RefinedSet
 
 ENTRY = "motion.connect.connect"
 """The function of the planner that takes longest to compile."""
+PLANNED = 0.5
+"""Fraction of the progress of a stop that is planning; the rest is the re-check with Drake."""
 
 
 def plan(
@@ -49,7 +51,8 @@ def plan(
             every goal is tried.
         order: Order of the goals at a stop: "best" for the shortest tour, "given" for their own.
         seed: Seed of the planner; the plan is the same for the same seed.
-        on_progress: Called with the number of finished stops and their total.
+        on_progress: Called with the finished per cent and 100, after every goal and every motion
+            that is re-checked; what it raises ends the planning.
         on_compile: Called before the planner compiles, if it has to.
 
     Returns:
@@ -100,14 +103,16 @@ def plan(
         ]
         stop = Stop.at_values(job, scene, values, seed)
         index = h if numbers is None else numbers[number]
-        planned, found = plan_stop(stop, index, number, goals, order)
+        report = _StopProgress(on_progress, number, len(places))
+        planned, found = plan_stop(stop, index, number, goals, order, report.planned)
         results |= {result.goal: result for result in found}
         stops.append(planned)
         check = StopCheck(stop)
         edges += sum(segment.edges for segment in planned.segments)
-        false += sum(check.false_pieces(segment) for segment in planned.segments)
-        if on_progress is not None:
-            on_progress(number + 1, len(places))
+        for done, segment in enumerate(planned.segments, 1):
+            false += check.false_pieces(segment)
+            report.checked(done / len(planned.segments))
+        report.checked(1.0)
     return MotionPlan(
         made_from=made_from(file),
         joints=tuple(job.spec.robot.arm_joints),
@@ -118,6 +123,25 @@ def plan(
         seed=seed,
         seconds=time.perf_counter() - begun,
     )
+
+
+@dataclass(frozen=True)
+class _StopProgress:
+    """Reports the finished fraction of one stop after those before it."""
+
+    on_progress: Callable[[int, int], None] | None
+    stop: int
+    stops: int
+
+    def planned(self, fraction: float) -> None:
+        self._report(PLANNED * fraction)
+
+    def checked(self, fraction: float) -> None:
+        self._report(PLANNED + (1.0 - PLANNED) * fraction)
+
+    def _report(self, fraction: float) -> None:
+        if self.on_progress is not None:
+            self.on_progress(round(100 * (self.stop + fraction) / self.stops), 100)
 
 
 def _numbers(

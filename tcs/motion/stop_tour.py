@@ -21,7 +21,12 @@ ORDERS = {"best": best_tour, "given": given_tour}
 
 
 def plan_stop(
-    stop: Stop, index: int | None, number: int, goals: Sequence[int], order: str = "best"
+    stop: Stop,
+    index: int | None,
+    number: int,
+    goals: Sequence[int],
+    order: str = "best",
+    on_step: Callable[[float], None] = lambda _: None,
 ) -> tuple[StopPlan, list[GoalResult]]:
     """Plan the tour of one stop through goals.
 
@@ -31,19 +36,24 @@ def plan_stop(
         number: Number of the stop in the plan.
         goals: Numbers of the goals.
         order: Order of the goals, one of ORDERS.
+        on_step: Called with the finished fraction after each goal is approached, and after each is
+            visited; what it raises ends the planning.
 
     Returns:
         The motions, and what became of each goal.
     """
     tour = _Tour(stop, number)
     blocked = stop.rest_contact()
-    for goal in goals:
+    steps = 2 * len(goals) + 1
+    for done, goal in enumerate(goals, 1):
         if blocked is not None:
             tour.fail(goal, "rest_blocked", blocked, "rest", time.perf_counter())
             continue
         tour.open(goal)
-    for goal, access in tour.order(ORDERS[order]):
+        on_step(done / steps)
+    for done, (goal, access) in enumerate(tour.order(ORDERS[order]), len(goals) + 1):
         tour.visit(goal, access)
+        on_step(done / steps)
     returns = tour.go_home()
     planned = StopPlan(stop.at, index, tuple(tour.segments), returns)
     return planned, list(tour.results.values())

@@ -178,6 +178,10 @@ class RescoreRequest(State):
     joints: Settings = Field(default_factory=dict)
     forbid: Annotated[list[ForbiddenRegion], Field(max_length=100)] = Field(default_factory=list)
     only_state: Annotated[bool, Field(strict=True)] = False
+    every: Annotated[int, Field(strict=True, ge=1, le=4)] = 1
+    """Score only every so many base positions along x and along y, for a first answer."""
+    around: tuple[Number, Number] | None = None
+    """Base position [m] whose nearest one of the grid is among those, with `every`."""
     max_members: Annotated[int, Field(strict=True, ge=1, le=3)] = 2
 
 

@@ -5,12 +5,18 @@ from __future__ import annotations
 import dataclasses
 import math
 import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
 
 from tcs.errors import SelectionError
 from tcs.model.grid import Axis, Grid
+from tcs.model.scene import Scene, SceneSpec
 from tcs.model.scene.changes import EnvironmentChanges, Shift, changed_environment
 from tcs.model.scene.pieces import PlacedPiece
 from tcs.placement.constraints import Constraints, recorded_constraints
+from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.offline import ScoringSetup
 from tcs.placement.scoring.rebuild import recorded_job
 from tcs.placement.store import ScoreFile
@@ -20,48 +26,82 @@ from tcs.service.requests import RescoreRequest
 from tcs.service.sent_documents import SentDocuments
 
 
-def rescored(
-    file: ScoreFile,
-    request: RescoreRequest,
-    sent: SentDocuments,
-    threads: int,
-    progress: Progress,
-) -> ScoreFile:
-    """Return the scores of a file's task in a changed environment.
+class Rescorer:
+    """Scores in changed environments; used by one thread.
 
-    Args:
-        file: The score file, of the environment before the changes.
-        request: The changes.
-        sent: Keeps the file of the changed environment, by which the scores name it.
-        threads: Number of threads.
-        progress: Reports the configurations done and in all.
-
-    Raises:
-        SelectionError: If the file is of several arms.
-        UnknownNameError: If nothing has the name of something that is moved.
-        TcsError: As `tcs.score`.
+    Building a scene takes as long as scoring a state of it, so the last one is kept: the visible
+    state, a coarse grid first, and then all states are scored in the same scene.
     """
-    if file.arms:
-        raise SelectionError(
-            f"a changed environment is scored for one arm, but the file is of "
-            f"{' and '.join(file.arms)}. Score the task with the robot of one arm."
+
+    def __init__(self, sent: SentDocuments, threads: int) -> None:
+        """Keep nothing yet.
+
+        Args:
+            sent: Keeps the files of changed environments, by which the scores name them.
+            threads: Number of threads.
+        """
+        self._sent, self._threads = sent, threads
+        self._job: tuple[Mapping[str, Any], Job] | None = None
+        self._scene: Scene | None = None
+        self._contacts: tuple[tuple[str, str], ...] = ()
+
+    def rescored(self, file: ScoreFile, request: RescoreRequest, progress: Progress) -> ScoreFile:
+        """Return the scores of a file's task in a changed environment.
+
+        Args:
+            file: The score file, of the environment before the changes.
+            request: The changes.
+            progress: Reports the configurations done and in all.
+
+        Raises:
+            SelectionError: If the file is of several arms.
+            UnknownNameError: If nothing has the name of something that is moved.
+            TcsError: As `tcs.score`.
+        """
+        if file.arms:
+            raise SelectionError(
+                f"a changed environment is scored for one arm, but the file is of "
+                f"{' and '.join(file.arms)}. Score the task with the robot of one arm."
+            )
+        begun = time.perf_counter()
+        grid = coarse(grid_of_state(file.configurations, request), request)
+        changed = changed_environment(
+            self._job_of(file).spec.environment,
+            changes_of(request),
+            {axis.name: axis for axis in grid.axes},
         )
-    begun = time.perf_counter()
-    grid = file.configurations
-    changed = changed_environment(
-        recorded_job(file.metadata).spec.environment,
-        changes_of(request),
-        {axis.name: axis for axis in grid_of_state(grid, request).axes},
+        recorded = recorded_constraints(file.metadata)
+        forbid = (*recorded.forbid, *regions_of(request.forbid))
+        setup = ScoringSetup.load(
+            file.metadata["task"], self._sent.made(changed), file.metadata["robot"],
+            measure=file.metadata["measure"], jobs=self._threads,
+            sets={"max_members": request.max_members}, constraints=Constraints(forbid=forbid),
+            approach="approach" in file.metadata, build=self._scene_of,
+        )  # fmt: skip
+        return setup.score(begun=begun, on_progress=progress, on_compile=progress.compiling)
+
+    def _job_of(self, file: ScoreFile) -> Job:
+        """Return the job of a file, the same as the last time for the same file."""
+        if self._job is None or self._job[0] is not file.metadata:
+            self._job = (file.metadata, recorded_job(file.metadata))
+        return self._job[1]
+
+    def _scene_of(self, job: Job) -> Scene:
+        """Return the scene of a job: the last one where only the grid is another."""
+        kept, contacts = self._scene, tuple(job.task.allowed_contacts)
+        if kept is None or self._contacts != contacts or not _is_same_scene(kept.spec, job.spec):
+            self._scene = None
+            self._scene, self._contacts = job.scene(), contacts
+        assert self._scene is not None
+        return self._scene
+
+
+def _is_same_scene(first: SceneSpec, second: SceneSpec) -> bool:
+    """Return whether two scenes differ in nothing but the grid that is scored in them."""
+    first_environment, second_environment = (
+        spec.environment.model_copy(update={"grid": {}}) for spec in (first, second)
     )
-    recorded = recorded_constraints(file.metadata)
-    forbid = (*recorded.forbid, *regions_of(request.forbid))
-    setup = ScoringSetup.load(
-        file.metadata["task"], sent.made(changed), file.metadata["robot"],
-        measure=file.metadata["measure"], jobs=threads,
-        sets={"max_members": request.max_members}, constraints=Constraints(forbid=forbid),
-        approach="approach" in file.metadata,
-    )  # fmt: skip
-    return setup.score(begun=begun, on_progress=progress, on_compile=progress.compiling)
+    return first.robot == second.robot and first_environment == second_environment
 
 
 def changes_of(request: RescoreRequest) -> EnvironmentChanges:
@@ -98,3 +138,34 @@ def grid_of_state(grid: Grid, request: RescoreRequest) -> Grid:
     }
     axes = tuple(states.get(axis.name, axis) for axis in grid.axes)
     return dataclasses.replace(grid, axes=axes)
+
+
+def coarse(grid: Grid, request: RescoreRequest) -> Grid:
+    """Return a grid with the base positions of a request.
+
+    Args:
+        grid: The grid with all base positions.
+        request: `every`, and a position in `around` that is to be among those that remain.
+
+    Raises:
+        SelectionError: If `around` is given without `every`.
+    """
+    if request.every == 1:
+        if request.around is not None:
+            raise SelectionError("'around' requires 'every' above 1.")
+        return grid
+    positions = dict(zip(("base_x", "base_y"), request.around or (None, None), strict=True))
+    axes = []
+    for axis in grid.axes:
+        if axis.name not in positions or axis.count == 1:
+            axes.append(axis)
+            continue
+        at = positions[axis.name]
+        nearest = 0 if at is None else int(np.argmin(np.abs(axis.values - at)))
+        first = nearest % min(request.every, axis.count)
+        count = 1 + (axis.count - 1 - first) // request.every
+        start = axis.start + first * axis.step
+        axes.append(
+            dataclasses.replace(axis, start=start, step=request.every * axis.step, count=count)
+        )
+    return dataclasses.replace(grid, axes=tuple(axes))

@@ -31,6 +31,7 @@ from tcs.service.sent_documents import SentDocuments
 if TYPE_CHECKING:
     from tcs.model.grid import InitialConfiguration
     from tcs.placement.scoring import LiveScorer
+    from tcs.service.rescoring import Rescorer
 
 # Drake and the compiler are loaded by the first job: choosing from files does without.
 
@@ -43,6 +44,7 @@ class SceneWork:
         self._files, self._sent, self._limits = files, sent, limits
         self._scorer: tuple[str, LiveScorer] | None = None
         """The last live scorer and the request that it is for: building it takes a second."""
+        self._rescorer: Rescorer | None = None
 
     def score(self, request: ScoreRequest, progress: Progress) -> dict[str, Any]:
         """Return the summary of a scored task, as `tcs score --json`, with the digest as `file`.
@@ -98,11 +100,12 @@ class SceneWork:
             StoreMismatchError: If the models are not those the file was made from.
             TcsError: As `tcs.score`, and if a change is not possible.
         """
-        from tcs.service.rescoring import rescored
+        from tcs.service.rescoring import Rescorer
 
         file = self._files.for_scene(request.file)
-        scored = rescored(file, request, self._sent, self._limits.threads, progress)
-        return self._held(scored)
+        if self._rescorer is None:
+            self._rescorer = Rescorer(self._sent, self._limits.threads)
+        return self._held(self._rescorer.rescored(file, request, progress))
 
     def evaluate(self, request: EvaluateRequest, progress: Progress) -> dict[str, Any]:
         """Return the success of a set under random errors, as `tcs evaluate --json`.

@@ -43,6 +43,32 @@ def test_the_arm_goes_from_rest_straight_in_and_out_and_back(planned, stop):
     assert at_stop.goals == (0,)
 
 
+def test_a_plan_of_one_stop_reports_its_progress_and_can_be_cancelled(two_goals):
+    class Cancelled(Exception):
+        pass
+
+    def progress(at_most):
+        seen = []
+
+        def on_progress(done, total):
+            seen.append((done, total))
+            if len(seen) == at_most:
+                raise Cancelled
+
+        tcs.plan(tcs.load(two_goals), [0], seed=3, on_progress=on_progress)
+        return seen
+
+    for at_most in (1, 5):
+        with pytest.raises(Cancelled):
+            progress(at_most)
+    seen = progress(None)
+    done = [one for one, _ in seen]
+    assert done == sorted(done)
+    assert (seen[0][0] < 30, seen[-1]) == (True, (100, 100))
+    # Two goals approached, one visited, four motions checked, and the stop.
+    assert len(seen) == 8
+
+
 def test_goals_that_cannot_be_done_say_why(planned):
     done, limited = planned.results
     assert done.done

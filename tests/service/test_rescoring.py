@@ -74,6 +74,42 @@ def test_a_wall_and_a_region_stand_in_the_way(path, rescored):
     assert 0 < excluded.all(axis=1).sum() < grid.size
 
 
+@pytest.mark.parametrize("around", [None, (0.61, 0.79)])
+def test_a_first_answer_has_the_scores_of_some_base_positions(path, rescored, around):
+    move = {"wheelchair": {"x": 0.07}}
+    whole, _ = rescored(move=move)
+    options = {} if around is None else {"around": around}
+    some, _ = rescored(move=move, every=2, max_members=1, **options)
+    first = (0, 0) if around is None else (0, 1)
+    x, y = (some.configurations.axis(f"base_{name}").values for name in "xy")
+    np.testing.assert_allclose(x, 0.2 + 2 * STEP * np.arange(3) + STEP * first[0])
+    np.testing.assert_allclose(y, (0.6 + STEP * np.arange(3))[first[1] :: 2])
+    of_whole = by_position(whole)[first[0] :: 2, first[1] :: 2]
+    assert of_whole.any()
+    np.testing.assert_array_equal(by_position(some), of_whole)
+
+
+@pytest.fixture
+def built(monkeypatch):
+    """The scenes that are built."""
+    from tcs.placement.scoring.job import Job
+
+    built, scene = [], Job.scene
+    monkeypatch.setattr(Job, "scene", lambda job: built.append(job) or scene(job))
+    return built
+
+
+def test_a_scene_is_built_once_for_each_change(path, rescored, built):
+    rescored(move={"wheelchair": {"y": 0.03}}, every=2)
+    first, _ = rescored(move={"wheelchair": {"y": 0.03}})
+    assert len(built) == 1
+    second, _ = rescored(move={"wheelchair": {"y": 0.04}})
+    assert len(built) == 2
+    assert first.metadata["scene_digest"] != second.metadata["scene_digest"]
+    rescored(joints={"head_tilt_deg": 5.0}, move={"wheelchair": {"y": 0.04}})
+    assert len(built) == 3
+
+
 def test_the_changed_environment_can_be_scored_again_by_its_file(engine, rescored, tmp_path):
     file, digest = rescored(
         move={"person": {"x": 0.05}}, joints={"head_tilt_deg": 5.0}, only_state=True
@@ -105,6 +141,7 @@ def test_its_scene_is_that_of_the_change(engine, path, rescored):
         ({"joints": {"head_tilt": 1.0, "head_tilt_deg": 5.0}}, "sets 'head_tilt' twice"),
         ({"joints": {"nose": 1.0}}, "unknown joint 'nose'"),
         ({"only_state": True, "at": {"bed_height": 0.0}}, "'at' must set nothing"),
+        ({"around": (0.0, 0.0)}, "'around' requires 'every'"),
     ],
 )
 def test_changes_that_cannot_be_made(engine, path, changes, message):

@@ -6,12 +6,14 @@ import { named, setting, t } from "./texts.js";
 
 const PIECES = ["chair", "table", "cabinet", "wall", "door", "region"];
 const SETTLED = 150; // time after the last change of a key or a slider at which it is scored [ms]
+const LARGE = 20000; // configurations in a state from which on a part of them is scored first
 const TURN = 15; // rotation of a thing by one press of R [deg]
 const SAME = 1e-4; // difference of two settings that is rounding
 const PLACED = /_(x|y|yaw|slide)(_deg)?$/; // joints that dragging stands in for
 
 export class Editing {
-  // `view` is what the page shows: its methods `scored`, `restore`, `nearest`, `fault`, and the values `file`, `at`, `states`.
+  // `view` is what the page shows: its methods `scored`, `restore`, `nearest`, `fault`, and the values `file`, `at`, `states`, the
+  // `size` of a state and the `place` of the robot.
   constructor(map, things, view) {
     Object.assign(this, { map, things, view });
     this.jobs = [];
@@ -237,14 +239,22 @@ export class Editing {
     by("changed").textContent = t("rescoring");
     document.body.setAttribute("aria-busy", "true");
     const begun = performance.now();
+    const seconds = () => ((performance.now() - begun) / 1000).toFixed(1);
     try {
+      if (this.view.size >= LARGE) {
+        const some = await this.#scored({ ...one, every: 2, around: this.view.place, max_members: 1 }, run);
+        if (!some) return;
+        await this.view.scored(some, { isOne: true, isFirst: true, state: one.at });
+        if (run !== this.run) return;
+        by("changed").textContent = t("rescoredFirst", { seconds: seconds() });
+        document.body.dataset.answered = seconds();
+      }
       const first = await this.#scored(one, run);
       if (!first) return;
       await this.view.scored(first, { isOne: true, state: one.at });
       if (run !== this.run) return;
-      const seconds = ((performance.now() - begun) / 1000).toFixed(1);
-      by("changed").textContent = t(this.at || isOne ? "rescored" : "rescoredOne", { seconds });
-      document.body.dataset.rescored = seconds;
+      by("changed").textContent = t(this.at || isOne ? "rescored" : "rescoredOne", { seconds: seconds() });
+      document.body.dataset.rescored = seconds();
       if (isOne || this.at) return;
       const whole = await this.#scored({ file: this.view.file, ...changes }, run);
       if (!whole) return;

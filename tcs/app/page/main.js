@@ -32,6 +32,8 @@ const editing = new Editing(map, things, {
   get file() { return file().file; },
   get at() { return at(); },
   get states() { return whole.floors.find(Boolean).states; },
+  get size() { return sizeOf(whole.floors.find(Boolean)); },
+  get place() { return [map.pose.x, map.pose.y]; },
   fault, moved, redraw: showScene, restore, scored, nearest,
 });
 
@@ -48,6 +50,7 @@ function shownFile(digest, state) {
   return { file: digest, floors: [], state, scene: null };
 }
 
+const sizeOf = ({ x, y, headings_deg, torsos }) => x.length * y.length * headings_deg.length * torsos.length;
 const file = () => page.files.find((one) => one.file === by("file").value);
 const floor = () => view.floors[view.state] ?? view.floors.find(Boolean);
 const at = () => floor().states[view.state];
@@ -112,7 +115,8 @@ async function openFile(wanted = new URLSearchParams()) {
   await floorOf(view, view.state);
   options(by("torso"), floor().torsos.map((value) => [value, value.toFixed(2)]), wanted.get("torso"));
   page.torso = Number(by("torso").value);
-  map.floor(floor(), by("score-of").value);
+  map.extent(floor());
+  drawFloor();
   map.scene([], null, things);
   map.suggest([]);
   links();
@@ -145,16 +149,18 @@ function links() {
   by("report").href = `v1/files/${view.file}/report`;
 }
 
-// Shows scores of the changed scene: of the visible state alone, or of all.
-async function scored(digest, { isOne, state }) {
+// Shows scores of the changed scene: of the visible state alone, or of all. A first answer has every second base position, the one of
+// the robot among them.
+async function scored(digest, { isOne, state, isFirst = false }) {
   page.rescored.add(digest);
   const states = whole.floors.find(Boolean).states;
   const number = isOne ? 0 : states.findIndex((one) => isSame(one, state));
   const next = shownFile(digest, number);
   await floorOf(next, number);
   view = next;
-  if (!isOne || states.length < 2) whole = next;
-  await shownAnew();
+  if (!isFirst && (!isOne || states.length < 2)) whole = next;
+  await shownAnew(isFirst);
+  if (isFirst) return;
   // The map moves outlines by itself; only other postures have other outlines.
   if (Object.keys(things.joints).length || editing.at) {
     sceneOf(next, structuredClone(things.moves)).then(() => next === view && showScene()).catch(fault);
@@ -169,12 +175,12 @@ async function scored(digest, { isOne, state }) {
 
 const isSame = (state, other) => Object.entries(state).every(([name, value]) => Math.abs(other[name] - value) < 1e-6);
 
-async function shownAnew() {
-  map.floor(floor(), by("score-of").value);
+async function shownAnew(isFirst = false) {
+  drawFloor();
   showScene();
   listStates();
   links();
-  await move(map.pose);
+  await move(map.pose, { isFirst });
 }
 
 // Goes back to the file as it was scored, in the present state.
@@ -193,6 +199,10 @@ async function nearest(state) {
   if (view === whole && view.state === state) return;
   view = whole;
   await changeState(state);
+}
+
+function drawFloor() {
+  map.floor(floor(), by("score-of").value);
 }
 
 // Returns the base position with the greatest score, where the page begins.
@@ -276,7 +286,7 @@ function listStates() {
 async function changeState(state) {
   await floorOf(view, state);
   view.state = state;
-  map.floor(floor(), by("score-of").value);
+  drawFloor();
   showScene();
   listStates();
   await move(map.pose);
@@ -292,14 +302,14 @@ async function space() {
   const found = await post("posture", { ...placed(), ...(goal ? { goal: Number(goal) } : {}) });
   if (number !== page.asked) return;
   view3d.contact = [];
-  view3d.map(map.canvas, map.bounds);
+  view3d.map(map.canvas, map.painted);
   view3d.scene(found, page.outcome.goals);
   if (page.lookedAt !== file().file) view3d.look(found.goals, [map.pose.x, map.pose.y]);
   page.lookedAt = file().file;
 }
 
-// Puts the robot somewhere, and shows what can be done from there.
-async function move(pose, { best = false, torso = page.torso } = {}) {
+// Puts the robot somewhere, and shows what can be done from there; of a first answer the words alone, for the rest takes time.
+async function move(pose, { best = false, torso = page.torso, isFirst = false } = {}) {
   const yaw = ((pose.yaw % 360) + 360) % 360;
   page.torso = torso;
   const { x, y } = map.within(pose);
@@ -321,8 +331,9 @@ async function move(pose, { best = false, torso = page.torso } = {}) {
     map.place({ x: pose.x, y: pose.y, yaw: member.base_yaw_deg });
   }
   show(outcome);
-  space().catch(fault);
   clearTimeout(page.suggesting);
+  if (isFirst) return;
+  space().catch(fault);
   page.suggesting = setTimeout(() => suggest(number).catch(fault), SETTLED);
 }
 
@@ -466,7 +477,7 @@ by("score").onsubmit = (event) => {
   scoreNow().catch((error) => { by("job").hidden = true; fault(error); });
 };
 by("ownFile").onchange = () => openOwn(by("ownFile").files[0]).catch(fault);
-by("score-of").onchange = () => { map.floor(floor(), by("score-of").value); listStates(); };
+by("score-of").onchange = () => { drawFloor(); listStates(); };
 by("map").onkeydown = (event) => {
   if (editing.keyed(event)) return event.preventDefault();
   const headings = floor()?.headings_deg ?? [];

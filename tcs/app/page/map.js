@@ -33,6 +33,13 @@ export function paint(canvas, floor, score) {
   context.putImageData(pixels, 0, 0);
 }
 
+const stepOf = (list) => (list.length > 1 ? list[1] - list[0] : 0.1);
+
+function boundsOf({ x, y }) {
+  const [dx, dy] = [stepOf(x) / 2, stepOf(y) / 2];
+  return { left: x[0] - dx, right: x.at(-1) + dx, low: y[0] - dy, high: y.at(-1) + dy };
+}
+
 function element(name, attributes, parent, text) {
   const made = document.createElementNS(SVG, name);
   for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
@@ -63,18 +70,22 @@ export class FloorMap {
     svg.addEventListener("pointerdown", (event) => this.#down(event));
   }
 
-  floor(floor, score) {
-    const step = (list) => (list.length > 1 ? list[1] - list[0] : 0.1);
-    const [dx, dy] = [step(floor.x), step(floor.y)];
-    this.step = Math.min(dx, dy);
-    const [left, right] = [floor.x[0] - dx / 2, floor.x.at(-1) + dx / 2];
-    const [low, high] = [floor.y[0] - dy / 2, floor.y.at(-1) + dy / 2];
+  // Takes what is drawn, and the step of the arrow keys, from the floor of a file.
+  extent(floor) {
+    this.step = Math.min(stepOf(floor.x), stepOf(floor.y));
+    this.bounds = boundsOf(floor);
+    const { left, right, low, high } = this.bounds;
     this.svg.setAttribute("viewBox", `${left} ${-high} ${right - left} ${high - low}`);
+    this.#ruler();
+  }
+
+  // Draws scores, of all base positions or of some.
+  floor(floor, score) {
     paint(this.canvas, floor, score);
+    this.painted = boundsOf(floor);
+    const { left, right, low, high } = this.painted;
     const place = { x: left, y: -high, width: right - left, height: high - low, href: this.canvas.toDataURL() };
     for (const [key, value] of Object.entries(place)) this.image.setAttribute(key, value);
-    this.bounds = { left, right, low, high };
-    this.#ruler();
   }
 
   // Draws the scene, a group for each thing, in the order of its lowest outline; what stands on a thing moves with it.

@@ -90,8 +90,12 @@ class ScoringSetup:
         approach: bool = False,
         blocks: BlockFolder | None = None,
         engine: ScoringEngine | None = None,
+        build: Callable[[Job], Scene] = Job.scene,
     ) -> Self:
         """Load and check everything, and build the scene.
+
+        The arguments are those of `tcs.score`; `build` returns the scene of the job, a new one or
+        an equal one that was kept.
 
         Raises:
             UnknownNameError: If a task, environment, robot, frame or measure of that name does not
@@ -106,7 +110,7 @@ class ScoringSetup:
             task, environment, robot, only=only, constraints=constraints, now=now, person=person
         )
         references = data_references(job, task, environment, robot)
-        return cls(job, job.scene(), references, options, measure, jobs, approach, blocks, engine)
+        return cls(job, build(job), references, options, measure, jobs, approach, blocks, engine)
 
     def score(
         self,
