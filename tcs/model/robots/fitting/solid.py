@@ -14,8 +14,8 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 CLOSING = 0.015
-"""Radius of the smallest ball that the space outside admits [m]: narrower hollows are filled, and
-so is whatever is behind openings narrower than twice this."""
+"""Usual radius of the smallest ball that the space outside admits [m]: narrower hollows are filled,
+and so is whatever is behind openings narrower than twice this."""
 _BORDER = 3
 """Cells beyond the space that may be of interest."""
 
@@ -40,27 +40,41 @@ class Solid:
         """Return the positions of chosen points of the grid [m], shape (n, 3)."""
         return np.asarray(np.argwhere(chosen) * self.pitch + self.origin)
 
+    def between(
+        self, low: FloatArray, high: FloatArray
+    ) -> tuple[tuple[slice, ...], NDArray[np.int64]]:
+        """Return the part of the grid that covers a box, and its first cell, shape (3,).
 
-def solid_of(triangles: FloatArray, pitch: float, reach: float) -> Solid:
+        Args:
+            low: Least corner of the box in the body's frame [m], shape (3,).
+            high: Greatest corner [m], shape (3,).
+        """
+        ends = np.array(self.outside.shape) - 1
+        first = np.floor((low - self.origin) / self.pitch).astype(np.int64).clip(0, ends)
+        last = np.ceil((high - self.origin) / self.pitch).astype(np.int64).clip(0, ends)
+        return tuple(slice(a, b + 1) for a, b in zip(first, last, strict=True)), first
+
+
+def solid_of(triangles: FloatArray, pitch: float, reach: float, closing: float = CLOSING) -> Solid:
     """Return the space within triangles, which need not form a closed surface.
 
-    Whatever a ball of radius CLOSING can touch from far away without crossing the surface is
-    outside.
+    Whatever a ball can touch from far away without crossing the surface is outside.
 
     Args:
         triangles: Corners [m], shape (n, 3, 3).
         pitch: Distance of the points of the grid [m].
         reach: Distance from the surface that the grid must cover [m].
+        closing: Radius of the ball [m].
     """
     points = np.rint(cut(triangles, pitch).reshape(-1, 3) / pitch).astype(np.int64)
-    border = int(np.ceil((CLOSING + reach) / pitch)) + _BORDER
+    border = int(np.ceil((closing + reach) / pitch)) + _BORDER
     first = points.min(axis=0) - border
     size = points.max(axis=0) - first + border + 1
     surface = np.zeros(size, np.bool_)
     surface[tuple((points - first).T)] = True
-    fits = ndimage.distance_transform_edt(~surface) * pitch > CLOSING
+    fits = ndimage.distance_transform_edt(~surface) * pitch > closing
     parts, _ = ndimage.label(fits)
-    reached = ndimage.distance_transform_edt(parts != parts[0, 0, 0]) * pitch <= CLOSING
+    reached = ndimage.distance_transform_edt(parts != parts[0, 0, 0]) * pitch <= closing
     return _measured(reached & ~surface, first * pitch, pitch)
 
 

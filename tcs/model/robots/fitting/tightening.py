@@ -20,8 +20,10 @@ from tcs.model.robots.fitting.bounding import (
 from tcs.model.robots.fitting.candidates import thinned
 from tcs.model.robots.fitting.enclosure import surfaces_to_enclose
 from tcs.model.robots.fitting.filling import fillers
+from tcs.model.robots.fitting.orienting import least_protruding
 from tcs.model.robots.fitting.reduction import contain, contained
-from tcs.model.robots.fitting.solid import solid_of
+from tcs.model.robots.fitting.solid import CLOSING as USUAL_CLOSING
+from tcs.model.robots.fitting.solid import Solid, solid_of
 from tcs.model.robots.primitives import FINEST, Primitive
 from tcs.model.robots.robot_file import RobotFile
 
@@ -29,10 +31,15 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
+CLOSING = 0.005
+"""Radius of the smallest ball that the space outside admits [m]: links pass each other in hollows
+that the usual one does not enter."""
+_CLOSING_CELLS = 2
+"""Least radius of the ball in points of the grid: a smaller one could pass between two of them."""
 FINEST_PITCH = 0.0005
 """Least distance of the points of the grid by which the space outside is measured [m]."""
-ACROSS = 160
-"""Most points of the grid along a body."""
+CELLS = 1_000_000
+"""Most points of the grid in the box around a body."""
 PIECE = 0.006
 """Longest edge of a piece [m], if the grid is finer than half of it; pieces that no shape contains
 are cut further."""
@@ -47,6 +54,8 @@ _WORTH = 0.002
 _NEW = 20
 """Weight of volume outside that was free of shapes before: pairs of bodies that were found never to
 touch should not do so now."""
+_NEAR = 0.15
+"""Border around points in which a box around them is rotated, as a fraction of their extent."""
 _INSIDE = 1e-3
 """Cost of volume inside, as a fraction of that outside: of two shapes that protrude alike the
 smaller is taken."""
@@ -57,8 +66,9 @@ def tightened(
 ) -> tuple[Primitive, ...]:
     """Return primitives that enclose a robot, those of some bodies made tighter.
 
-    Each shape is reduced to what it alone contains, in the way that leaves the least volume outside
-    the body; then those that protrude most are split in two. Only the surface decides.
+    Each shape is reduced to what it alone contains, and boxes are rotated, so that the least volume
+    outside the body is left; then those that protrude most are split in two. Only the surface
+    decides.
 
     Args:
         robot: The robot.
@@ -80,6 +90,8 @@ def tightened(
         tightening = Tightening(body, found[body], triangles)
         tightening.reduce()
         tightening.split(most)
+        # What shapes leave each other has changed.
+        tightening.reduce()
         tight = tightening.shapes
         found[body] = (*tight, *fillers(body, tight, triangles))
     return tuple(shape for fitted in found.values() for shape in fitted)
@@ -96,20 +108,18 @@ class Tightening:
             shapes: Shapes that enclose the triangles.
             triangles: Corners in the frame of the body [m], shape (n, 3, 3).
         """
-        size = float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
         self._body, self._shapes = body, list(shapes)
-        self._solid = solid_of(triangles, max(FINEST_PITCH, size / ACROSS), 0.0)
-        longest = max(PIECE, 2 * self._solid.pitch)
-        self._pieces = _pieces_in(self._shapes, triangles, longest)
+        volume = float(np.ptp(triangles, axis=(0, 1)).prod())
+        pitch = max(FINEST_PITCH, float(np.cbrt(volume / CELLS)))
+        reach = _overhang(self._shapes, triangles)
+        self._solid, inside = _measured(triangles, pitch, reach)
+        self._pieces = _pieces_in(self._shapes, triangles, max(PIECE, 2 * pitch))
         points, index = np.unique(self._pieces.reshape(-1, 3), axis=0, return_inverse=True)
         self._corners, self._index = points, index.reshape(-1, 3)
-        solid = self._solid
-        inside = solid.points(solid.depth > max(DEEP, 4 * solid.pitch))
-        inside = thinned(inside, max(DEEP, size / SPACINGS))
         self._inside = inside[np.any([s.contains(inside) for s in self._shapes], axis=0)]
         self._within = [self._contained(shape) for shape in self._shapes]
         self._count = np.sum(self._within, axis=0)
-        self._held = np.zeros(solid.outside.size, np.int16)
+        self._held = np.zeros(self._solid.outside.size, np.int16)
         self._cells = [self._outside(shape) for shape in self._shapes]
         for cells in self._cells:
             self._held[cells] += 1
@@ -207,9 +217,32 @@ class Tightening:
     def _tightest(self, shape: Primitive, points: FloatArray) -> tuple[Primitive, float]:
         """Return the shape around points that protrudes least where no other one does [m^3]."""
         tried = [shape, *_around(self._body, shape, points)]
-        costs = [self._added(self._outside(s)) + _INSIDE * s.volume for s in tried]
-        best = int(np.argmin(costs))
-        return tried[best], costs[best]
+        outside, costs = self._bare_near(points)
+        starts = {box.quaternion: box.rotation for box in tried if box.kind == "box"}
+        for start in starts.values():
+            R = least_protruding(points, start, outside, costs, _INSIDE)
+            tried.append(enclose(self._body, points, "box", R))
+        total = [self._added(self._outside(s)) + _INSIDE * s.volume for s in tried]
+        best = int(np.argmin(total))
+        return tried[best], total[best]
+
+    def _bare_near(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return cells near points that no shape contains, and what each costs.
+
+        Returns:
+            Positions outside the body [m], shape (n, 3), and costs [m^3], shape (n,).
+        """
+        solid = self._solid
+        low, high = points.min(axis=0), points.max(axis=0)
+        border = _NEAR * float(np.linalg.norm(high - low)) + 2 * solid.pitch
+        around, first = solid.between(low - border, high + border)
+        held, allowed = (
+            a.reshape(solid.outside.shape)[around] for a in (self._held, self._allowed)
+        )
+        bare = (solid.outside[around] > 0.0) & (held == 0)
+        cells = np.argwhere(bare)
+        counts = np.where(allowed[bare], 1.0, 1.0 + _NEW)
+        return (cells + first) * solid.pitch + solid.origin, counts * solid.pitch**3
 
     def _points(self, pieces: IntArray, inside: IntArray) -> FloatArray:
         """Return the corners of pieces and the points inside of given numbers, shape (n, 3)."""
@@ -240,7 +273,8 @@ class Tightening:
 
     def _own(self, cells: IntArray) -> float:
         """Return the volume of the cells that one shape alone contains [m^3]."""
-        return float(np.count_nonzero(self._held[cells] == 1)) * self._solid.pitch**3
+        alone = cells[self._held[cells] == 1]
+        return len(alone) * self._solid.pitch**3
 
     def _added(self, cells: IntArray) -> float:
         """Return the volume of the cells that no shape contains [m^3].
@@ -248,8 +282,8 @@ class Tightening:
         Those that no shape contained at first count as many times as is needed to avoid them.
         """
         bare = cells[self._held[cells] == 0]
-        weight = len(bare) + _NEW * np.count_nonzero(~self._allowed[bare])
-        return float(weight) * self._solid.pitch**3
+        counts = np.where(self._allowed[bare], 1.0, 1.0 + _NEW)
+        return float(counts.sum()) * self._solid.pitch**3
 
     def _contained(self, shape: Primitive) -> BoolArray:
         return np.concatenate([contained(shape, self._pieces), shape.contains(self._inside)])
@@ -257,13 +291,38 @@ class Tightening:
     def _outside(self, shape: Primitive) -> IntArray:
         """Return the cells outside the body that a shape contains, shape (n,)."""
         solid = self._solid
-        low, high = (shape.bounds - solid.origin) / solid.pitch
-        first = np.maximum(np.floor(low), 0).astype(np.int64)
-        last = np.minimum(np.ceil(high), np.array(solid.outside.shape) - 1).astype(np.int64)
-        around = tuple(slice(a, b + 1) for a, b in zip(first, last, strict=True))
+        around, first = solid.between(*shape.bounds)
         cells = np.argwhere(solid.outside[around] > 0.0) + first
         cells = cells[shape.contains(cells * solid.pitch + solid.origin)]
         return np.asarray(np.ravel_multi_index(tuple(cells.T), solid.outside.shape))
+
+
+def _measured(triangles: FloatArray, pitch: float, reach: float) -> tuple[Solid, FloatArray]:
+    """Return the space of a body, and points deep inside it that shapes should keep covered.
+
+    Args:
+        triangles: Corners [m], shape (n, 3, 3).
+        pitch: Distance of the points of the grid [m].
+        reach: Distance from the surface that the grid must cover [m].
+    """
+    extent = float(np.ptp(triangles, axis=(0, 1)).max())
+    closing = max(CLOSING, _CLOSING_CELLS * pitch)
+    solid = solid_of(triangles, pitch, reach, closing)
+    # The inside of a cover with openings that only the smaller ball enters.
+    wide = solid_of(triangles, pitch, 0.0, max(USUAL_CLOSING, extent / SPACINGS))
+    deep = wide.points(wide.depth > DEEP)
+    cells = np.rint((deep - solid.origin) / pitch).astype(np.int64)
+    outside = solid.outside.copy()
+    outside[tuple(cells.T)] = 0.0
+    inside = wide.points(wide.depth > max(DEEP, 4 * pitch))
+    return replace(solid, outside=outside), thinned(inside, max(DEEP, extent / SPACINGS))
+
+
+def _overhang(shapes: list[Primitive], triangles: FloatArray) -> float:
+    """Return how far shapes reach beyond the box around triangles [m]."""
+    low, high = np.array([shape.bounds for shape in shapes]).swapaxes(0, 1)
+    below = triangles.min(axis=(0, 1)) - low.min(axis=0)
+    return float(max(0.0, *below, *(high.max(axis=0) - triangles.max(axis=(0, 1)))))
 
 
 def _pieces_in(shapes: list[Primitive], triangles: FloatArray, longest: float) -> FloatArray:
