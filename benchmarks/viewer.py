@@ -64,9 +64,10 @@ def score_file(job: tuple[str, str, str], folder: Path) -> Path:
 
 def opening(job: tuple[str, str, str], path: Path, repeats: int) -> None:
     """Measure the whole command, and within a process from the file to Meshcat."""
-    command = [sys.executable, "-m", "tcs", "view", str(path), "--no-browser", "--duration", "0"]
+    command = [sys.executable, "-m", "tcs", "view", str(path), "--meshcat"]
+    command += ["--no-browser", "--duration", "0"]
     measured(
-        f"{name_of(job)}: the whole command `tcs view`",
+        f"{name_of(job)}: the whole command `tcs view --meshcat`",
         [
             timed(lambda: subprocess.run(command, check=True, capture_output=True))
             for _ in range(repeats)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import threading
 import warnings
 import webbrowser
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any
+from urllib.parse import urlencode
 
 import typer
 
@@ -141,17 +143,43 @@ def app(
     jobs: options.Jobs = 2,
 ) -> None:
     """Open the page for people: pick a task, click a place, read what can be done from there."""
-    http = _http("app")
+    open_page(files, window, jobs)
+
+
+def open_page(
+    files: list[Path] | None,
+    window: options.WindowOptions,
+    jobs: int,
+    *,
+    command: str = "app",
+    first: Mapping[str, str] = MappingProxyType({}),
+) -> None:
+    """Serve the page for people until it is interrupted, and open it in a browser.
+
+    Args:
+        files: Score files to hold.
+        window: Where it is served and for how long.
+        jobs: Number of threads.
+        command: The command that opens it, for messages.
+        first: What is shown first, as in the address of the page; of the first file.
+
+    Raises:
+        ServiceError: If a package that it needs is not installed.
+    """
+    http = _http(command)
     from tcs.app import add_page
 
     with _engine(files, jobs, terminal.note) as engine:
         application = http.make_application(engine, http.Access())
         add_page(application)
         server = http.Server(application, host="127.0.0.1", port=window.port or 0)
-        terminal.note(f"open {server.url} in a browser; Ctrl-C ends.")
+        address = server.url
+        if first:
+            address += f"/#{urlencode({'file': engine.files()[0].file, **first})}"
+        terminal.note(f"open {address} in a browser; Ctrl-C ends.")
         if window.browser:
             # Opening a browser may wait for the browser.
-            threading.Thread(target=webbrowser.open, args=(server.url,), daemon=True).start()
+            threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
         server.run(window.duration)
 
 
@@ -229,7 +257,7 @@ def _http(command: str) -> Any:
     try:
         from tcs.service import http
     except ModuleNotFoundError as error:
-        extra = "app" if command == "app" else "service"
+        extra = "service" if command == "serve" else "app"
         raise ServiceError(
             f"`tcs {command}` needs the package {error.name}: pip install 'tcs[{extra}]'."
         ) from None

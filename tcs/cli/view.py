@@ -1,4 +1,4 @@
-"""The command `tcs view`: show a score file or a plan in the browser."""
+"""The command `tcs view`: open the page of a score file, or show it or a plan in Meshcat."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import typer
 
 from tcs.cli import options
 from tcs.cli.option_groups import expand_options
+from tcs.cli.serve import open_page
 from tcs.output import terminal
 from tcs.output.terminal import tables
 
@@ -28,8 +29,17 @@ def view(
         bool,
         typer.Option("--swept", help="Of a plan: show the volume that the arm sweeps."),
     ] = False,
+    meshcat: Annotated[
+        bool,
+        typer.Option(
+            "--meshcat",
+            help="Show the set with the robot's own meshes in Meshcat, in place of the page of "
+            "`tcs app`; so do --max-members, --observed and --no-refined.",
+        ),
+    ] = False,
+    jobs: options.Jobs = 2,
 ) -> None:
-    """Show a score file in the browser: its sets, any base pose, each goal; or play a plan."""
+    """Open the page of a score file: any base pose, each goal, its sets; or play a plan."""
     page.check()
     if file.suffix == ".json":
         if chosen != options.ShownOptions():
@@ -39,6 +49,9 @@ def view(
     if swept:
         raise typer.BadParameter("requires a plan.json.", param_hint="--swept")
     here = chosen.state()
+    if page.export is None and not meshcat and not _names_a_set(chosen):
+        open_page([file], window, jobs, command="view", first=_first_shown(chosen))
+        return
 
     import tcs
     from tcs.output.view import make_score_view, show_score_view, write_score_view
@@ -64,6 +77,21 @@ def view(
         on_line=typer.echo,
         on_note=terminal.note,
     )
+
+
+def _names_a_set(chosen: options.ShownOptions) -> bool:
+    """Return whether options choose another set than the page suggests by itself."""
+    return chosen != options.ShownOptions(here=chosen.here, torso=chosen.torso)
+
+
+def _first_shown(chosen: options.ShownOptions) -> dict[str, str]:
+    """Return where the robot stands first, as in the address of the page."""
+    if chosen.here is None:
+        return {}
+    return {
+        key: f"{value:g}"
+        for key, value in zip(("x", "y", "yaw", "torso"), (*chosen.here, chosen.torso), strict=True)
+    }
 
 
 def _view_plan(

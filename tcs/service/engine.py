@@ -121,8 +121,11 @@ class Engine:
     def open_file(self, path: Path) -> FileEntry:
         """Hold a score file of this machine until the engine is closed; not for requests.
 
+        Motions that `tcs motions` saved beside it are held too.
+
         Raises:
-            StoreError: If it cannot be read, or is not a score file.
+            StoreError: If it or its motions cannot be read, or it is not a score file.
+            StoreMismatchError: If the motions were planned for other scores.
         """
         return self._files.read(path).entry
 
@@ -245,7 +248,8 @@ class Engine:
         """
         with self._files.held(request.file).lock:
             file = self._files.loaded(request.file)
-            return floor_of(file, table_of(file, request), request.state)
+            motions = self._files.known_motions(request.file)
+            return floor_of(file, table_of(file, request), request.state, motions)
 
     def outcome(self, request: OutcomeRequest) -> dict[str, Any]:
         """Return what is reached from a base pose, as `tcs.service.floor.outcome_of`.

@@ -7,6 +7,7 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tcs.model.grid import Grid, InitialConfiguration
 from tcs.output.words import (
@@ -18,27 +19,35 @@ from tcs.output.words import (
     text_of_goal,
 )
 from tcs.placement.reasons import nearest_configuration
-from tcs.placement.store import ScoreFile
+from tcs.placement.store import MotionFile, ScoreFile
 from tcs.placement.tables import Reason, ScoreTable
 from tcs.placement.tables.equations import tc_manipulability, tc_reachability
 from tcs.placement.tables.place_map import PlaceMap
+from tcs.placement.tables.success import NO_MEMBER
 
 _DECIMALS = 4
 """Decimals of scores on a map."""
+_SAME = 1e-6
+"""Difference of two positions [m or rad] that is rounding."""
 
 
-def floor_of(file: ScoreFile, table: int, state: int) -> dict[str, Any]:
+def floor_of(
+    file: ScoreFile, table: int, state: int, motions: MotionFile | None = None
+) -> dict[str, Any]:
     """Return the best scores at each base position in one state of the environment.
 
     Args:
         file: A score file.
         table: Number of its table.
         state: Number of the state of the environment, in C order over its axes.
+        motions: The motions that were found for the file, if any.
 
     Returns:
         `x` and `y` of the positions [m]; `reachability`, `manipulability` and `free` (whether the
         base touches nothing) as lists over x of lists over y; `states`, the settings of every state
-        of the environment; `frames`, the positions of the body frames [m].
+        of the environment; `frames`, the positions of the body frames [m]; `success`, where it was
+        estimated, of the best set with a base there, and `motion`, where motions were examined, the
+        greatest weight of the goals that can be done, both None elsewhere.
 
     Raises:
         GridError: If there is no such state.
@@ -57,7 +66,52 @@ def floor_of(file: ScoreFile, table: int, state: int) -> dict[str, Any]:
         "headings_deg": np.round(np.degrees(grid.axis("base_yaw").values), 6).tolist(),
         "torsos": np.round(grid.axis("torso").values, 6).tolist(),
         "measure": file.metadata["measure"],
+        **_success_at_places(file, table, state),
+        **_motion_at_places(file, table, state, motions),
     }
+
+
+def _success_at_places(file: ScoreFile, table: int, state: int) -> dict[str, Any]:
+    """Return the success of the best estimated set with a base at each position, under `success`.
+
+    The entry is missing where no set with a base in this state was estimated.
+    """
+    estimated = file.tables[table].success
+    if estimated is None:
+        return {}
+    rows, _ = np.nonzero(estimated.members != NO_MEMBER)
+    members = estimated.members[estimated.members != NO_MEMBER]
+    return _at_places("success", file.configurations, state, members, estimated.success[rows])
+
+
+def _motion_at_places(
+    file: ScoreFile, table: int, state: int, motions: MotionFile | None
+) -> dict[str, Any]:
+    """Return the greatest weight of goals with a motion at each position, under `motion`.
+
+    The entry is missing where nothing was examined in this state.
+    """
+    found = None if motions is None else motions.tables[table]
+    if found is None:
+        return {}
+    done = tc_reachability(found.done, file.tables[table].scores.weights)
+    return _at_places("motion", file.configurations, state, found.configurations, done)
+
+
+def _at_places(
+    name: str, grid: Grid, state: int, configurations: NDArray[np.int32], values: NDArray[Any]
+) -> dict[str, Any]:
+    """Return the greatest value at each base position in a state; None where none is known."""
+    of_state = grid.state_of(configurations.astype(np.int64)) == state
+    if not np.any(of_state):
+        return {}
+    along = grid.indices(configurations[of_state].astype(np.int64))
+    names = [axis.name for axis in grid.axes]
+    x, y = (along[:, names.index(axis)] for axis in ("base_x", "base_y"))
+    best = np.full((grid.axis("base_x").count, grid.axis("base_y").count), -1.0)
+    np.maximum.at(best, (x, y), values[of_state])
+    best = np.round(best, _DECIMALS)
+    return {name: [[None if v < 0.0 else v for v in row] for row in best.tolist()]}
 
 
 def settings_of_state(grid: Grid, state: int) -> dict[str, float]:
@@ -82,7 +136,9 @@ def outcome_of(
     Returns:
         The configuration that was read, the place relative to the person, its scores, and `goals`:
         for each its name, its number among those on the same body frame (`place`, from 1), whether
-        it is reached, and the reason.
+        it is reached, and the reason. `refined` is true where a member of a refined set is exactly
+        there; then the outcome is its own, and goals that it does not reach have the reason
+        "unreached".
 
     Raises:
         SelectionError: If a value is not finite, or an axis is missing or exceeded.
@@ -96,7 +152,13 @@ def outcome_of(
     goals = [_goal(file, scores, rows, goal) for goal in range(scores.goals)]
     reached, dexterity = scores.reached[rows].any(axis=0), scores.dexterity[rows].max(axis=0)
     state = int(grid.state_of(np.array([index]))[0])
-    member = grid.configuration(index)
+    member, refined = grid.configuration(index), None if best else _refined_at(file, table, stated)
+    if refined is not None:
+        member, reached, dexterity = refined
+        goals = [
+            {**goal, **_refined_goal(bool(reached[i]), float(dexterity[i]))}
+            for i, goal in enumerate(goals)
+        ]
     place = relative_place(
         member.base_x, member.base_y, member.base_yaw, frames_of_state(file, table, state)
     )
@@ -114,7 +176,42 @@ def outcome_of(
         "reachability": round(float(tc_reachability(reached, scores.weights)), 12),
         "manipulability": round(float(tc_manipulability(dexterity, scores.weights)), 12),
         "goals": goals,
+        "refined": refined is not None,
         "measure": file.metadata["measure"],
+    }
+
+
+def _refined_at(
+    file: ScoreFile, table: int, stated: InitialConfiguration
+) -> tuple[InitialConfiguration, NDArray[np.bool_], NDArray[np.float32]] | None:
+    """Return the member of a refined set that is exactly where stated, and what it reaches."""
+    refined = file.tables[table].refined
+    if refined is None:
+        return None
+    axes = file.configurations.axes
+    known = dict(stated.environment)
+    at = [known[axis.name] if axis.name in known else getattr(stated, axis.name) for axis in axes]
+    away = refined.values - np.array(at)
+    for i, axis in enumerate(axes):
+        if axis.name == "base_yaw":
+            away[..., i] = np.sin(0.5 * away[..., i])
+    found = np.argwhere(np.all(np.abs(away) < _SAME, axis=-1) & (refined.origin != NO_MEMBER))
+    if not len(found):
+        return None
+    row, i = found[0]
+    return stated, refined.reached[row, i], refined.dexterity[row, i]
+
+
+def _refined_goal(is_reached: bool, dexterity: float) -> dict[str, Any]:
+    """Return the outcome at a goal from a refined place, for which no reason is kept."""
+    reason = Reason.REACHED.name.lower() if is_reached else "unreached"
+    words = REASON_TEXTS[Reason.REACHED] if is_reached else "not reached"
+    return {
+        "reached": is_reached,
+        "reason": reason,
+        "words": words,
+        "pair": None,
+        "dexterity": dexterity,
     }
 
 

@@ -14,7 +14,14 @@ from tcs.files.paths import is_path
 from tcs.files.reading import read_bytes
 from tcs.files.writing import scratch_folder
 from tcs.output.words import frame_name, person_text
-from tcs.placement.store import MotionFile, ScoreFile, load_scores, save_scores
+from tcs.placement.store import (
+    MotionFile,
+    ScoreFile,
+    load_motions,
+    load_scores,
+    motion_path,
+    save_scores,
+)
 from tcs.service.limits import Limits
 from tcs.service.responses import FileEntry
 
@@ -107,15 +114,22 @@ class ScoreFiles:
             return self.add(path.read_bytes(), is_ours=True)
 
     def read(self, path: Path) -> HeldFile:
-        """Hold a file that is named when the service starts, until it ends.
+        """Hold a file that is named when the service starts, until it ends, and its motions.
 
         Raises:
-            StoreError: If it cannot be read, or is not a score file.
+            StoreError: If it or its motions cannot be read, or it is not a score file.
+            StoreMismatchError: If the motions were planned for other scores.
         """
         content = read_bytes(
             path, f"Score file '{path}'", StoreError, limit=self._limits.stored_bytes
         )
-        return self.add(content, is_ours=True, is_pinned=True)
+        held = self.add(content, is_ours=True, is_pinned=True)
+        beside = motion_path(path)
+        if beside.exists():
+            motions = load_motions(beside)
+            motions.check_belongs(self.loaded(held.entry.file))
+            self.hold_motions(held.entry.file, motions)
+        return held
 
     def entries(self) -> list[FileEntry]:
         """Return the files that are held, in the order in which they came."""
@@ -190,6 +204,11 @@ class ScoreFiles:
                 )
             self._motions.move_to_end(digest)
             return self._motions[digest]
+
+    def known_motions(self, digest: str) -> MotionFile | None:
+        """Return the motions that were found for a file, or None."""
+        with self._lock:
+            return self._motions.get(digest)
 
     def hold_motions(self, digest: str, motions: MotionFile) -> None:
         """Hold the motions of a file, in place of others of the same file."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 import tcs
@@ -19,6 +21,14 @@ return [...document.querySelectorAll("button, select, summary, input, a.button")
   .filter(one => one.offsetParent && one.type !== "checkbox")
   .filter(one => one.getBoundingClientRect().height < 44)
   .map(one => one.outerHTML.slice(0, 80));
+"""
+
+AXE = Path(__file__).parents[2] / "node_modules" / "axe-core" / "axe.min.js"
+RUN_AXE = """
+const done = arguments[arguments.length - 1];
+axe.run(document, {resultTypes: ["violations"]}).then(found => done(found.violations
+  .filter(one => ["serious", "critical"].includes(one.impact))
+  .map(one => `${one.id}: ${one.nodes.map(node => node.html.slice(0, 120)).join(" | ")}`)));
 """
 
 
@@ -152,6 +162,9 @@ def test_the_3d_view_follows_and_motions_are_played(page):
         lambda: "can be done" in script("return document.getElementById('planWords').textContent")
     )
     words = script("return document.getElementById('planWords').textContent")
+    limits = script("return document.getElementById('planLimits').textContent")
+    assert "Not checked: driving" in limits
+    assert script("return document.querySelectorAll('#limits li').length") == 4
     if not words.startswith("0 "):
         page.wait(lambda: not script("return document.getElementById('player').hidden"))
         time = "return Number(document.getElementById('time').value)"
@@ -173,6 +186,38 @@ def test_languages_and_sizes(page):
     assert script("return document.documentElement.lang") == "de"
     script("const one = document.getElementById('language'); one.value = 'en'; one.onchange()")
     page.wait(lambda: "reached" in script(WORDS))
+
+
+def test_axe_finds_nothing_serious_in_any_part(page):
+    if not AXE.exists():
+        pytest.skip("needs axe-core: npm install --no-save axe-core")
+    script = page.driver.execute_script
+    page.driver.set_script_timeout(60)
+    script(AXE.read_text(encoding="utf-8"))
+    assert page.driver.execute_async_script(RUN_AXE) == []
+    # Everything opened: changed scene, explanation, colours, scoring and the details for experts.
+    page.wait(lambda: not script("return document.getElementById('editing').hidden"))
+    choose = "const one = document.getElementById('piece'); one.value = arguments[0];"
+    for piece in ("chair", "region"):
+        script(choose + "document.getElementById('addPiece').click()", piece)
+    page.wait(lambda: not script("return document.body.hasAttribute('aria-busy')"))
+    script("document.getElementById('drawRegion').click()")
+    script("for (const one of document.querySelectorAll('details')) one.open = true")
+    script(
+        "document.getElementById('job').hidden = document.getElementById('player').hidden = false"
+    )
+    script("document.querySelector('#goals button').click()")
+    page.wait(lambda: not script("return document.getElementById('why').hidden"))
+    for language in ("en", "de"):
+        script(
+            "const one = document.getElementById('language'); one.value = arguments[0];"
+            "one.onchange()",
+            language,
+        )
+        page.wait(lambda: script("return document.documentElement.lang") == language)  # noqa: B023
+        assert page.driver.execute_async_script(RUN_AXE) == []
+    script("const one = document.getElementById('language'); one.value = 'en'; one.onchange()")
+    page.wait(lambda: script("return document.documentElement.lang") == "en")
 
 
 def test_a_task_is_scored_and_another_is_cancelled(page):

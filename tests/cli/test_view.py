@@ -30,11 +30,29 @@ def test_scores_of_other_models_are_not_shown(tcs_command, small_file, tmp_path)
     assert not page.exists()
 
 
+def test_a_score_file_is_opened_on_the_page(tcs_command, small_file):
+    ran = tcs_command("view", small_file, "--no-browser", "--duration", 0.1)
+    assert ran.code == 0
+    assert "open http://127.0.0.1:" in ran.err
+    here = ("--here", 1.5, -0.25, 90, "--torso", 0.3)
+    ran = tcs_command("view", small_file, *here, "--no-browser", "--duration", 0.1)
+    assert ran.code == 0
+    assert "&x=1.5&y=-0.25&yaw=90&torso=0.3 in a browser" in ran.err
+
+
+@pytest.mark.parametrize("options", [("--meshcat",), ("--max-members", 1), ("--no-refined",)])
+def test_a_set_that_is_named_is_shown_in_meshcat(tcs_command, small_file, options):
+    # Only Meshcat shows the scene itself, and so refuses scores of other models.
+    ran = tcs_command("view", small_file, *options, "--no-browser", "--duration", 0.1)
+    assert ran.code == 1
+    assert "Score the task again" in ran.err
+
+
 @pytest.mark.slow
 def test_a_scored_task_can_be_viewed_and_exported(process, tmp_path):
     file, page = tmp_path / "feeding.tcs", tmp_path / "scene.html"
     assert process("score", "feeding", "--out", file).code == 0
-    ran = process("view", file, "--no-browser", "--duration", 0.1)
+    ran = process("view", file, "--meshcat", "--no-browser", "--duration", 0.1)
     assert ran.code == 0
     assert "member 1 of 2: goal " in ran.out
     assert "http://localhost:" in ran.err

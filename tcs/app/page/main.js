@@ -3,7 +3,7 @@
 import { Refusal, cancel, ended, get, post, send } from "./api.js";
 import { Editing, thingName } from "./editing.js";
 import { FloorMap, paint } from "./map.js";
-import { by, made, options, showCards, showExpert, showGoals, showLegend, showStates, showWhy } from "./panels.js";
+import { by, made, offerColours, options, showCards, showExpert, showGoals, showLegend, showStates, showWhy } from "./panels.js";
 import { goalText, load, sentence, t } from "./texts.js";
 import { Things, overlap, turned } from "./things.js";
 import { Playing } from "./playing.js";
@@ -83,7 +83,8 @@ function say() {
   options(by("person"), Object.keys(PERSONS).map((key) => [key, t(`persons.${key}`)]), by("person").value || "default");
   by("limits").replaceChildren();
   for (const text of t("limits")) made("li", text, by("limits"));
-  showLegend();
+  offerColours(view.floors);
+  showLegend(by("score-of").value);
   editing.say();
 }
 
@@ -202,6 +203,8 @@ async function nearest(state) {
 }
 
 function drawFloor() {
+  offerColours(view.floors);
+  showLegend(by("score-of").value);
   map.floor(floor(), by("score-of").value);
 }
 
@@ -279,6 +282,7 @@ async function otherStates(shown) {
 }
 
 function listStates() {
+  offerColours(view.floors);
   if (view.floors.filter(Boolean).length < floor().states.length) return;
   showStates(view.floors, by("score-of").value, view.state, paint, (state) => changeState(state).catch(fault));
 }
@@ -342,7 +346,7 @@ function show(outcome) {
   by("fault").textContent = "";
   by("why").hidden = true;
   const blocked = outcome.goals.every((goal) => goal.reason === "body_blocked");
-  by("words").textContent = blocked ? t("blocked") : sentence(outcome);
+  by("words").textContent = blocked ? t("blocked") : `${sentence(outcome)}${outcome.refined ? ` ${t("refinedHere")}` : ""}`;
   const { x, y, yaw } = map.pose;
   by("x").value = x.toFixed(3);
   by("y").value = y.toFixed(3);
@@ -390,12 +394,12 @@ async function fixOf(goal) {
 
 // Goes to a configuration: its base pose, torso height and state of the environment.
 async function go(member) {
-  const state = floor().states.findIndex((settings) =>
-    Object.entries(settings).every(([name, value]) => Math.abs(member[name] - value) < 1e-6));
+  const distance = (settings) => Object.entries(settings).reduce((sum, [name, value]) => sum + Math.abs(member[name] - value) / (name.endsWith("_deg") ? 60 : 1), 0);
+  const state = floor().states.reduce((best, settings, i, all) => (distance(settings) < distance(all[best]) ? i : best), 0);
   const pose = { x: member.base_x, y: member.base_y, yaw: member.base_yaw_deg };
   page.torso = member.torso;
   map.place(pose);
-  if (state >= 0 && state !== view.state) await changeState(state);
+  if (state !== view.state) await changeState(state);
   else await move(pose);
   by("map").focus({ preventScroll: true });
 }

@@ -4,7 +4,7 @@ import { MARKS, grouped } from "./marks.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 const SCALE = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]]; // viridis
-const COLOURS = { person: "#e3a57f", furniture: "#7b8794", blocked: [196, 202, 209], added: "#8a7350", region: "#b3003b" };
+const COLOURS = { person: "#e3a57f", furniture: "#7b8794", blocked: [196, 202, 209], unknown: [246, 234, 215], added: "#8a7350", region: "#b3003b" };
 const HANDLE = 0.62; // distance of the handle from the middle of the base [m]
 const DRAG = 4; // movement that makes a click a drag [px]
 const UNKNOWN_BASE = [[0.3, 0.3], [-0.3, 0.3], [-0.3, -0.3], [0.3, -0.3]]; // until the outline is there [m]
@@ -22,11 +22,12 @@ export function paint(canvas, floor, score) {
   const context = canvas.getContext("2d");
   const pixels = context.createImageData(columns, rows);
   const values = floor[score];
-  const most = score === "reachability" ? 1 : Math.max(...values.flat(), 1e-9);
+  const most = score === "manipulability" ? Math.max(...values.flat(), 1e-9) : 1;
   for (let i = 0; i < columns; i++) {
     for (let j = 0; j < rows; j++) {
       const free = floor.free[i][j];
-      const shown = !free ? COLOURS.blocked : values[i][j] > 0 ? colour(values[i][j] / most) : [255, 255, 255];
+      const value = values?.[i][j] ?? null;
+      const shown = !free ? COLOURS.blocked : value === null ? COLOURS.unknown : value > 0 ? colour(value / most) : [255, 255, 255];
       pixels.data.set([...shown, 255], 4 * ((rows - 1 - j) * columns + i));
     }
   }

@@ -67,6 +67,11 @@ export function showCards(choices, onGo, onShow) {
     made("p", t("travel", { metres: choice.cost.toFixed(1) }), card);
     const axes = choice.moves.map((axis) => named("settings", axis)).join(", ");
     made("p", axes ? t("moves", { axes }) : t("unmoved"), card);
+    if (choice.success !== undefined) {
+      const [success, low, high] = [choice.success, ...choice.success_ci95].map((value) => (100 * value).toFixed(1));
+      made("p", t("successOf", { success, low, high }), card);
+    }
+    if (choice.refined !== undefined) made("p", t("refinedSet"), card);
     card.onpointerenter = () => onShow(choice);
     choice.members.forEach((member, i) => {
       const button = made("button", t("go", { number: i + 1 }), card, { type: "button" });
@@ -76,14 +81,26 @@ export function showCards(choices, onGo, onShow) {
   }
 }
 
-export function showLegend() {
+// The colours that the floors of a file can have: two always, the others where the file has them.
+export function offerColours(floors) {
+  const select = by("score-of");
+  for (const [name, text] of [["success", "bySuccess"], ["motion", "byMotion"]]) {
+    const option = select.querySelector(`[value=${name}]`);
+    option.disabled = !floors.some((floor) => floor?.[name]);
+    option.textContent = option.disabled ? t("notInFile", { what: t(text) }) : t(text);
+    if (option.disabled && select.value === name) select.value = "reachability";
+  }
+}
+
+export function showLegend(score) {
   const list = by("legend");
   list.replaceChildren();
   const scale = made("li", undefined, list);
-  scale.append(`${t("legend.low")} `);
+  scale.append(`${t(`legend.${score}.low`)} `);
   made("span", undefined, scale, { class: "scale" });
-  scale.append(t("legend.high"));
-  for (const [name, colour] of [["blocked", "blocked"], ["person", "person"], ["furniture", "furniture"], ["goal", "goal"]]) {
+  scale.append(t(`legend.${score}.high`));
+  const unknown = ["success", "motion"].includes(score) ? [["unknown", "unknown"]] : [];
+  for (const [name, colour] of [...unknown, ["blocked", "blocked"], ["person", "person"], ["furniture", "furniture"], ["goal", "goal"]]) {
     const item = made("li", undefined, list);
     made("span", undefined, item, { class: colour });
     item.append(t(`legend.${name}`));

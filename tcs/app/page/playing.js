@@ -48,7 +48,7 @@ export class Playing {
     [this.frames, this.poses] = [[], []];
     by("player").hidden = true;
     by("done").replaceChildren();
-    by("planWords").textContent = "";
+    by("planWords").textContent = by("planLimits").textContent = "";
   }
 
   async plan() {
@@ -64,7 +64,10 @@ export class Playing {
       by("planWords").textContent = t("cancelled");
     };
     const done = await ended(job.job, (state) => {
-      if (number === this.number) by("planWords").textContent = state.note ? t("compiling") : state.state === "queued" ? t("waiting") : t("planning");
+      if (number !== this.number) return;
+      const percent = state.total ? Math.round((100 * state.done) / state.total) : 0;
+      by("planWords").textContent = state.note ? t("compiling") : state.state === "queued" ? t("waiting") : t("planning", { percent: 10 * Math.floor(percent / 10) });
+      by("planning").querySelector("progress").value = percent / 100;
     });
     if (number !== this.number) return;
     by("planning").hidden = true;
@@ -76,6 +79,7 @@ export class Playing {
     const list = done.result.results.filter((one) => outcome.goals[one.goal].reached);
     const count = list.filter((one) => one.done).length;
     by("planWords").textContent = t("planned", { count, goals: list.length, seconds: stop.duration.toFixed(0) });
+    by("planLimits").textContent = t("planLimits");
     for (const one of list.filter((result) => !result.done)) {
       made("li", t("notDone", { goal: goalName(outcome.goals[one.goal]), reason: t(`motionReasons.${one.reason}`) }), by("done"));
     }

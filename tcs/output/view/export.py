@@ -6,18 +6,24 @@ import html
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import matplotlib
+from matplotlib.colors import to_hex
 from pydrake.geometry import Meshcat, MeshcatAnimation
 from pydrake.math import RigidTransform
 
+from tcs.output.draw import Category
+from tcs.output.draw.colours import SCALE
 from tcs.output.view.floor import REACHABILITY, floor_map
 from tcs.output.view.scene_objects import (
     FLOOR,
+    MEMBER_COLOUR,
     SHOWN,
     SceneObjects,
     Snapshot,
     arrow_path,
     draw_floor,
 )
+from tcs.output.view.shapes import ARM_COLOUR
 from tcs.output.view.viewed_set import ViewedSet
 from tcs.output.words import REASON_COLOURS, REASON_NAMES, goals_text
 from tcs.placement.tables import Reason
@@ -26,6 +32,17 @@ _RATE = 10
 """Frames per second; a change takes one frame."""
 _HOLD = 15
 """Frames for which each goal is shown."""
+_PAUSE = """<button type="button" id="tcs-pause">Pause</button><script>{
+const button = document.getElementById("tcs-pause");
+const say = () => { button.textContent = viewer.animator.playing ? "Pause" : "Play"; };
+button.onclick = () => {
+  if (viewer.animator.playing) viewer.animator.pause();
+  else viewer.animator.play();
+  say();
+};
+setInterval(say, 500);
+}</script>"""
+"""Button that pauses the animation of Meshcat, whose own control is in a closed folder."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +107,7 @@ def export_page(
         meshcat.SetProperty(path, "visible", path in visible[0])
     if len(shots) > 1:
         meshcat.SetAnimation(_animation(shots, visible))
-    panel = _panel(title, [*_captions(viewed, steps), *notes])
+    panel = _panel(title, [*_captions(viewed, steps), *notes], plays=len(shots) > 1)
     return str(meshcat.StaticHtml()).replace("</body>", f"{panel}\n</body>", 1)
 
 
@@ -134,28 +151,65 @@ def _captions(viewed: ViewedSet, steps: tuple[PlayStep, ...]) -> list[str]:
     return lines or ["No configuration reaches a goal."]
 
 
-def _panel(title: str, lines: list[str]) -> str:
-    """Return title, lines and the legend of the arrows as an overlay."""
+def _panel(title: str, lines: list[str], *, plays: bool) -> str:
+    """Return title, lines and the legend of what is shown as an overlay."""
     # The browser may break the line at the spaces between the entries.
-    colours = " ".join(
-        '<span style="white-space:nowrap;margin-right:1em">'
-        f'<span style="color:{REASON_COLOURS[one]}">&#9632;</span> {REASON_NAMES[one]}</span>'
-        for one in Reason
+    arrows = " ".join(swatch(REASON_COLOURS[one], REASON_NAMES[one]) for one in Reason)
+    objects = " ".join(
+        swatch(category.colour, category.label)
+        for category in (Category.PERSON, Category.FURNITURE, Category.ROBOT)
     )
-    return overlay(title, lines, f"<p>{colours}</p>")
+    objects += f" {swatch(ARM_COLOUR, Category.ARM.label)}"
+    marks = " ".join(
+        swatch(colour, text)
+        for colour, text in (
+            (MEMBER_COLOUR, "outline: where the base stands"),
+            (Category.CURRENT_GOAL.colour, "sphere: goal shown"),
+        )
+    )
+    more = (
+        f"<p>Arrows: {arrows}</p><p>Floor: P_R of a base there, {_gradient()} none to the best; "
+        f"without colour: no goal.</p><p>{objects} {marks}</p>"
+    )
+    return overlay(title, lines, more, plays=plays)
 
 
-def overlay(title: str, lines: Sequence[str], more: str = "") -> str:
+def swatch(colour: str, text: str) -> str:
+    """Return an entry of a legend as HTML: a square of a colour, and what it means."""
+    return (
+        '<span style="white-space:nowrap;margin-right:1em"><span style="display:inline-block;'
+        f'width:.8em;height:.8em;border:1px solid #555;background:{colour}"></span> '
+        f"{html.escape(text)}</span>"
+    )
+
+
+def _gradient() -> str:
+    """Return the colours of the floor, from none to the best, as HTML."""
+    scale = matplotlib.colormaps[SCALE]
+    stops = ",".join(to_hex(scale(fraction)) for fraction in (0.0, 0.25, 0.5, 0.75, 1.0))
+    return (
+        '<span style="display:inline-block;width:7em;height:.8em;border:1px solid #555;'
+        f'background:linear-gradient(90deg,{stops})"></span>'
+    )
+
+
+def overlay(title: str, lines: Sequence[str], more: str = "", *, plays: bool = False) -> str:
     """Return title and lines of text as an HTML overlay.
 
     Args:
         title: First line, in bold.
         lines: Further lines.
         more: HTML below them, inserted unescaped.
+        plays: Whether the page has an animation, for which there is a button to pause.
     """
     paragraphs = "".join(f"<p>{html.escape(line)}</p>" for line in lines)
     return (
-        "<style>#tcs{position:fixed;left:0;top:0;max-width:44em;margin:8px;padding:6px 10px;"
-        "background:#ffffffdd;font:13px sans-serif;color:#222}#tcs p{margin:3px 0}</style>"
-        f'<div id="tcs"><p><b>{html.escape(title)}</b></p>{paragraphs}{more}</div>'
+        "<style>#tcs{position:fixed;left:0;top:0;max-width:min(44em,calc(100vw - 16px));margin:8px;"
+        "max-height:calc(100vh - 16px);overflow:auto;box-sizing:border-box;padding:6px 10px;"
+        "background:#ffffffdd;font:13px sans-serif;color:#222}#tcs p{margin:3px 0}"
+        "#tcs summary{cursor:pointer;font-weight:bold;padding:6px 0}"
+        "#tcs button{min-width:6em;min-height:44px;font:inherit}</style>"
+        f'<div id="tcs">{_PAUSE if plays else ""}'
+        f"<details><summary>{html.escape(title)}</summary>{paragraphs}{more}</details></div>"
+        "<script>document.querySelector('#tcs details').open = innerWidth > 700;</script>"
     )

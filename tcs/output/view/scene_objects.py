@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,11 +38,14 @@ _MARK_RADIUS = 0.018
 """Radius of the sphere at the shown goal [m]: visible beside an arrow, and does not hide it."""
 _ARROW = (0.16, 0.055, 0.009, 0.022)
 """Length of an arrow and of its head, half widths of shaft and head [m]."""
-_MEMBER = "#d7263d"
+MEMBER_COLOUR = "#d7263d"
+"""Colour of the outlines of the members."""
 _MAP_HEIGHT, _LINE_HEIGHT = 0.004, 0.008
 """Heights above the floor [m], different to avoid flicker."""
-_CAMERA = np.array([1.9, -1.9, 1.3])
-"""Position relative to the centre of the goals [m]: a whole bed and a robot are in view."""
+_AWAY, _ABOVE = 2.7, 1.3
+"""Distances of the camera from the centre of the goals [m]: a whole bed and a robot are in view."""
+_ASIDE = 1.75
+"""Angle of the camera from the first base about the goals [rad]: the robot hides none of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,10 +134,12 @@ class SceneShapes:
             meshcat.SetTriangleMesh(path, corners, faces, rgba(REASON_COLOURS[reason]))
             meshcat.SetProperty(path, "visible", False)
         meshcat.SetObject(SHOWN, Sphere(_MARK_RADIUS), rgba(Category.CURRENT_GOAL.colour))
-        for number, at in enumerate(members):
+        places = list(members)
+        for number, at in enumerate(places):
             self._draw_member(meshcat, number, at)
-        middle = np.mean([X.translation() for X in goal_poses(self.scene, self.task)], axis=0)
-        meshcat.SetCameraPose(middle + _CAMERA, middle)
+        goals = goal_poses(self.scene, self.task)
+        base = (places[0].base_x, places[0].base_y) if places else None
+        meshcat.SetCameraPose(*camera_pose(goals, base))
 
     def _draw_member(self, meshcat: Meshcat, number: int, at: InitialConfiguration) -> None:
         """Draw the outline and the heading of the base."""
@@ -144,7 +149,7 @@ class SceneShapes:
         around = np.vstack([stand.polygon, stand.polygon[:1]])
         for name, line in (("outline", around), ("ahead", np.stack([middle, middle + ahead]))):
             points = np.column_stack([line, np.full(len(line), _LINE_HEIGHT)])
-            meshcat.SetLine(f"{MEMBERS}/{number}/{name}", points.T, 4.0, rgba(_MEMBER))
+            meshcat.SetLine(f"{MEMBERS}/{number}/{name}", points.T, 4.0, rgba(MEMBER_COLOUR))
 
 
 class SceneObjects(SceneShapes):
@@ -177,6 +182,29 @@ class SceneObjects(SceneShapes):
         """Add all objects to Meshcat, without poses: see `draw`."""
         members = (self._viewed.configuration(index) for index in self._viewed.members)
         self.draw(meshcat, arrows, members, compact=compact)
+
+
+def camera_pose(
+    goals: Sequence[RigidTransform], base: tuple[float, float] | None
+) -> tuple[FloatArray, FloatArray]:
+    """Return where the camera is and what it looks at, so that person and goals are seen first [m].
+
+    It looks at the goals from the side of the robot from which the tool comes, or where there is no
+    robot, from there.
+
+    Args:
+        goals: Poses of the goals in W.
+        base: Position of the first base [m]; None without one.
+    """
+    middle = np.mean([X.translation() for X in goals], axis=0)
+    x, y, _ = -np.mean([X.rotation().matrix()[:, 0] for X in goals], axis=0)
+    outwards = float(np.arctan2(y, x))
+    around = outwards
+    if base is not None:
+        robot = float(np.arctan2(base[1] - middle[1], base[0] - middle[0]))
+        around = max((robot - _ASIDE, robot + _ASIDE), key=lambda one: np.cos(one - outwards))
+    away = np.array([_AWAY * np.cos(around), _AWAY * np.sin(around), _ABOVE])
+    return middle + away, middle
 
 
 def arrow_path(arrow: Arrow) -> str:

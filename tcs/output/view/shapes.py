@@ -23,6 +23,8 @@ from tcs.output.draw import Category
 FloatArray = NDArray[np.float64]
 _GREY = Rgba(0.75, 0.77, 0.8, 1.0)
 """Colour of meshes without a colour in the URDF."""
+ARM_COLOUR = "#a3adb8"
+"""Colour of the scored arm: neutral, for the colours of the arrows say what is reached."""
 
 _ROUNDED = 0.7
 """Radius of the edges of a rounded box, as a fraction of its least half size."""
@@ -70,11 +72,11 @@ def robot_shapes(scene: Scene, meshes: bool) -> list[BodyShape]:
             shape, X_LS = inspector.GetShape(geometry), inspector.GetPoseInFrame(geometry)
             shapes.append(BodyShape(body.index(), shape, X_LS, colour))
     drawn = {one.body for one in shapes}
-    colourings = {Group.ARM: Category.ARM, Group.BODY: Category.ROBOT}
+    colourings = {Group.ARM: ARM_COLOUR, Group.BODY: Category.ROBOT.colour}
     for part in parts:
         if part.body not in drawn:
             shape, X_LS = inspector.GetShape(part.geometry), inspector.GetPoseInFrame(part.geometry)
-            shapes.append(BodyShape(part.body, shape, X_LS, rgba(colourings[part.group].colour)))
+            shapes.append(BodyShape(part.body, shape, X_LS, rgba(colourings[part.group])))
     return shapes
 
 

@@ -4,9 +4,11 @@ import dataclasses
 
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform, RollPitchYaw
 
 from tcs.model.scene import Scene
 from tcs.output.view import SceneObjects, ViewedSet, export, export_page, open_meshcat, play_steps
+from tcs.output.view.scene_objects import camera_pose
 from tests.output.view.browser import chromium
 
 
@@ -32,9 +34,32 @@ def test_page_states_what_it_is_and_fits_into_four_megabytes(objects, shaving_se
         open_meshcat(), objects, shaving_set, title="Shaving & more", notes=["By <no one>."]
     )
     assert "Shaving &amp; more" in text
+    for entry in ("Arrows: ", "goal shown", "where the base stands", "scored arm"):
+        assert entry in text
+    assert text.count('id="tcs-pause"') == 1
     assert "By &lt;no one&gt;." in text
     assert text.count("</body>") == 1
     assert len(text.encode()) < 4e6
+
+
+@pytest.mark.parametrize("base", [(2.0, 0.0), (-1.0, -1.0), (0.0, 1.5), None])
+def test_the_camera_sees_person_and_goals_beside_the_robot(base):
+    goals = [RigidTransform(p=[0.4, 0.1, 1.0]), RigidTransform(p=[0.6, -0.1, 1.2])]
+    eye, middle = camera_pose(goals, base)
+    assert middle == pytest.approx([0.5, 0.0, 1.1])
+    away = eye - middle
+    assert np.hypot(*away[:2]) == pytest.approx(2.7)
+    if base is None:
+        # Tools point along x: they come from the other side.
+        assert away[:2] == pytest.approx([-2.7, 0.0])
+        return
+    towards = np.array(base) - middle[:2]
+    cosine = away[:2] @ towards / np.hypot(*towards) / 2.7
+    assert cosine == pytest.approx(np.cos(1.75))
+    turned = RigidTransform(RollPitchYaw(0.0, 0.0, np.pi), [0.0, 0.0, 0.0])
+    mirrored = [RigidTransform(turned.rotation(), goal.translation()) for goal in goals]
+    if abs(towards[1]) > 0.1:
+        assert camera_pose(mirrored, base)[0] != pytest.approx(eye)
 
 
 class Recorder:
@@ -108,6 +133,11 @@ def test_page_plays_through_the_set_without_a_server(browser, objects, shaving_s
     del meshcat
     browser.open(path.as_uri(), "robot")
     steps = play_steps(shaving_set)
+    script = browser.driver.execute_script
+    browser.wait(lambda: script("return viewer.animator.playing"))
+    script("document.getElementById('tcs-pause').click()")
+    assert not script("return viewer.animator.playing")
+    assert script("return document.getElementById('tcs-pause').textContent") == "Play"
     seek = "viewer.animator.pause(); viewer.animator.seek(arguments[0]);"
     where = """
     const p = viewer.scene_tree.find(["drake", "robot"]).object.position; return [p.x, p.y, p.z];

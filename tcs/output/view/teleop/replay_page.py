@@ -106,7 +106,7 @@ def replay_page(
     _play_bars(animation, view.arm, readouts)
     _play_lines(animation, panel, readouts)
     meshcat.SetAnimation(animation)
-    text = overlay(title, notes)
+    text = overlay(title, notes, plays=True)
     return str(meshcat.StaticHtml()).replace("</body>", f"{text}\n</body>", 1)
 
 
