@@ -9,6 +9,7 @@ from table import CHECKOUT, header, parser, record, row, save
 
 import tcs
 from tcs.output.words import member_text, percentage
+from tcs.placement.tables import ScoreTable, SetTable
 
 TASKS = ("shaving", "feeding", "brushing")
 STRAIGHT = "wheelchair"
@@ -32,7 +33,7 @@ def main() -> None:
     for task in TASKS:
         for name, environment in (("straight", STRAIGHT), ("turned", TURNING)):
             file = tcs.score(task, environment, "pr2", jobs=options.jobs)
-            gain.append([task, name, *cells(file)])
+            gain.append([task, name, *cells(file.nominal.scores, file.nominal.sets)])
             row(f"{task}, {name}", "  ".join(gain[-1][2:]))
         sets = file.nominal.sets
         members = (file.configurations.configuration(h).to_json() for h in sets.best_single)
@@ -42,15 +43,14 @@ def main() -> None:
     save(options)
 
 
-def cells(file: tcs.ScoreFile) -> list[str]:
+def cells(scores: ScoreTable, sets: SetTable) -> list[str]:
     """Return the scores of the best single configuration and of the best set."""
-    sets = file.nominal.sets
     single, best = sets.scores_of(sets.best_single), sets.scores_of(sets.best)
-    complete = int(file.nominal.scores.reached.all(axis=1).sum())
+    reached = scores.reached
     return [
         *(percentage(single[0]), f"{single[1]:.3f}"),
         *(percentage(best[0]), f"{best[1]:.3f}"),
-        f"{complete:,} of {file.configurations.size:,}",
+        f"{int(reached.all(axis=1).sum()):,} of {len(reached):,}",
     ]
 
 

@@ -1,13 +1,12 @@
-"""Paths between joint angles of the Panda: time, success and length, beside OMPL's.
+"""Paths between joint angles of the Panda: time, success and length, beside OMPL's and roboplan's.
 
 Usage: python benchmarks/planning.py [--limit 100] [--compared 4] [--seeds 50] [--seed 0]
 
 The problems are MotionBenchMaker's (`planning_problems`), with the fingers as wide open as there.
 A cylinder becomes the prism of twelve sides around it, of six boxes. A problem is refused where
 start or goal is beyond a joint limit, in contact with itself or an obstacle, or nearer than the
-margins of scoring; the pairs that do so are counted. Both planners use the same shapes: OMPL's
-RRT-Connect calls the posture check of the kernel, at postures at most 0.02 rad apart, and its own
-simplification follows. Times are those of the processor, one core, without preparing the scene.
+margins of scoring; the pairs that do so are counted. Times are those of the processor, one core,
+without preparing the scene. What the peers plan with is said in `planning_peers`.
 """
 
 from __future__ import annotations
@@ -19,6 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from planning_peers import Roboplan, length, ompl_path
 from planning_problems import Obstacle, Problem, planning_problems, robot_of_problems
 from scipy.spatial.transform import Rotation
 from table import cell, header, parser, row, save
@@ -49,25 +49,21 @@ AGAIN = 10.0
 MOST_ITERATIONS = 100_000
 """Number of random postures to grow towards: scenes without a task may be narrower than those of
 `tcs plan`."""
-OMPL_SECONDS = 30.0
-"""Time that OMPL is given [s]."""
-OMPL_STEP = 0.02
-"""Greatest distance of the postures that OMPL checks [rad]."""
 
 
 def main() -> None:
-    """Plan every problem, and some of them with OMPL."""
+    """Plan every problem, and some of them with the peers too."""
     command_line = parser(__doc__)
     command_line.add_argument("--limit", type=int, default=100, help="problems of each scene")
     command_line.add_argument(
-        "--compared", type=int, default=4, help="problems of each scene for OMPL and all seeds"
+        "--compared", type=int, default=4, help="problems of each scene for peers and all seeds"
     )
     command_line.add_argument("--seeds", type=int, default=50, help="seeds of the best length")
     command_line.add_argument("--seed", type=int, default=0)
     options = command_line.parse_args()
-    header("ompl")
+    header("ompl", "roboplan")
     row("seed", str(options.seed))
-    bench = Bench()
+    bench, roboplan = Bench(), Roboplan()
     refusals, tallies = Counter[str](), defaultdict[str, list[Found]](list)
     total = Counter[str]()
     for problem in planning_problems():
@@ -84,7 +80,9 @@ def main() -> None:
             query.planned(options.seed)
         compared = len(tallies[problem.scene]) < options.compared
         tallies[problem.scene].append(
-            query.found(options.seed, options.seeds if compared else 0, compared)
+            query.found(
+                options.seed, options.seeds if compared else 0, roboplan if compared else None
+            )
         )
     tallies["all"] = [found for scene in list(tallies) for found in tallies[scene]]
     total["all"] = total.total()
@@ -107,9 +105,10 @@ class Found:
     """Whether other random numbers found a path where the first did not."""
     best: float
     """Least length of all seeds [rad], nan if they were not tried."""
-    ompl_milliseconds: float
-    ompl_length: float
-    """Results of OMPL, nan where it was not tried or found nothing."""
+    ompl: tuple[float, float]
+    roboplan: tuple[float, float]
+    """Time [ms] and length [rad] of the peers, nan where they were not tried, inf where they found
+    nothing."""
 
 
 class Bench:
@@ -206,71 +205,39 @@ class Query:
     def _environment_bodies(self) -> int:
         return len(self.problem.obstacles)
 
-    def found(self, seed: int, seeds: int, with_ompl: bool) -> Found:
-        """Return the results of one seed, the best of several, and OMPL's."""
+    def found(self, seed: int, seeds: int, roboplan: Roboplan | None) -> Found:
+        """Return the results of one seed and the best of several.
+
+        With roboplan's scene, also those of the peers.
+        """
         begun = time.process_time()
-        length = self.planned(seed)
+        radians = self.planned(seed)
         milliseconds = 1e3 * (time.process_time() - begun)
-        again, begun = not np.isfinite(length), time.process_time()
+        again, begun = not np.isfinite(radians), time.process_time()
         solved, other = False, seed
         while again and not solved and time.process_time() - begun < AGAIN:
             other += 1
             solved = bool(np.isfinite(self.planned(other)))
         best = min((self.planned(one) for one in range(seed, seed + seeds)), default=np.nan)
-        ompl = self.ompl_planned(seed) if with_ompl else (np.nan, np.nan)
-        return Found(milliseconds, length, solved, best, *ompl)
+        peers = [(np.nan, np.nan)] * 2
+        if roboplan:
+            limits = self.scene.lower, self.scene.upper
+            peers = [
+                ompl_path(self.problem, limits, self.is_free, seed),
+                roboplan.path(self.problem, seed),
+            ]
+        return Found(milliseconds, radians, solved, best, *peers)
+
+    def is_free(self, q: FloatArray) -> bool:
+        """Return whether a posture touches nothing."""
+        return bool(posture_contact(self.scene, self.work, q) == NO_PAIR)
 
     def planned(self, seed: int) -> float:
         """Return the length of a path [rad], inf if none was found."""
         trees = new_trees(seed)
         ends = self.problem.start[None], self.problem.goal[None]
         count = connect(self.scene, self.work, trees, *ends, MOST_ITERATIONS, SHORTCUTS)
-        return _length(trees.path[:count]) if count else np.inf
-
-    def ompl_planned(self, seed: int) -> tuple[float, float]:
-        """Return time [ms] and length [rad] of OMPL's RRT-Connect, inf if it finds no path."""
-        import ompl.base
-        import ompl.geometric
-        import ompl.util
-
-        ompl.util.noOutputHandler()
-        ompl.util.RNG.setSeed(seed + 1)
-        space = ompl.base.RealVectorStateSpace(7)
-        bounds = ompl.base.RealVectorBounds(7)
-        for k in range(7):
-            bounds.setLow(k, float(self.scene.lower[k]))
-            bounds.setHigh(k, float(self.scene.upper[k]))
-        space.setBounds(bounds)
-        setup = ompl.geometric.SimpleSetup(space)
-        q = np.empty(7)
-
-        def is_valid(state: object) -> bool:
-            for k in range(7):
-                q[k] = state[k]  # type: ignore[index]
-            return posture_contact(self.scene, self.work, q) == NO_PAIR
-
-        setup.setStateValidityChecker(is_valid)
-        information = setup.getSpaceInformation()
-        information.setStateValidityCheckingResolution(OMPL_STEP / space.getMaximumExtent())
-        setup.setPlanner(ompl.geometric.RRTConnect(information))
-        start, goal = space.allocState(), space.allocState()
-        for k in range(7):
-            start[k], goal[k] = float(self.problem.start[k]), float(self.problem.goal[k])
-        setup.setStartAndGoalStates(start, goal)
-        begun = time.process_time()
-        solved = setup.solve(OMPL_SECONDS)
-        if not solved or not setup.haveExactSolutionPath():
-            return np.inf, np.inf
-        setup.simplifySolution(OMPL_SECONDS)
-        milliseconds = 1e3 * (time.process_time() - begun)
-        path = setup.getSolutionPath()
-        states = [path.getState(n) for n in range(path.getStateCount())]
-        return milliseconds, _length(np.array([[state[k] for k in range(7)] for state in states]))
-
-
-def _length(path: FloatArray) -> float:
-    """Return the length of a path [rad, norm of the joints]."""
-    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+        return length(trees.path[:count]) if count else np.inf
 
 
 def report(scene: str, problems: int, found: list[Found]) -> None:
@@ -286,26 +253,40 @@ def report(scene: str, problems: int, found: list[Found]) -> None:
         "slowest [ms]": f"{times[2]:.0f}",
         "median length [rad]": f"{np.median([one.length for one in solved]):.2f}",
     }
-    compared = [one for one in solved if np.isfinite(one.best) and np.isfinite(one.ompl_length)]
+    compared = [one for one in solved if np.isfinite(one.best)]
     for column, text in cells.items():
         cell("problems", scene, column, text)
     row(scene, ", ".join(f"{column} {text}" for column, text in cells.items()))
     if not compared:
         return
-    ratios = [one.length / one.best for one in compared]
-    longer = [one.length / one.ompl_length for one in compared]
-    slower = np.median([one.ompl_milliseconds for one in compared])
-    own = np.median([one.milliseconds for one in compared])
+    ratio = np.median([one.length / one.best for one in compared])
     peers = {
         "problems": str(len(compared)),
-        "length / best of the seeds": f"{np.median(ratios):.2f}",
-        "length / OMPL's": f"{np.median(longer):.2f}",
-        "median [ms]": f"{own:.0f}",
-        "OMPL, median [ms]": f"{slower:.0f}",
+        "length / best of the seeds": f"{ratio:.2f}",
+        "median [ms]": f"{np.median([one.milliseconds for one in compared]):.0f}",
     }
+    for name in ("ompl", "roboplan"):
+        peers |= beside(name, [(one.length, *getattr(one, name)) for one in compared])
     for column, text in peers.items():
         cell("compared", scene, column, text)
     row(f"{scene}, compared", ", ".join(f"{column} {text}" for column, text in peers.items()))
+
+
+def beside(name: str, results: list[tuple[float, float, float]]) -> dict[str, str]:
+    """Return the cells of a peer.
+
+    Args:
+        name: Its name.
+        results: Our length [rad], its time [ms] and length [rad], of each problem.
+    """
+    solved = [one for one in results if np.isfinite(one[2])]
+    if not solved:
+        return {f"{name}: solved": "0", f"{name}: median [ms]": "-", f"length / {name}'s": "-"}
+    return {
+        f"{name}: solved": str(len(solved)),
+        f"{name}: median [ms]": f"{np.median([one[1] for one in solved]):.0f}",
+        f"length / {name}'s": f"{np.median([one[0] / one[2] for one in solved]):.2f}",
+    }
 
 
 if __name__ == "__main__":
