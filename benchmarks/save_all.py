@@ -30,6 +30,10 @@ PARTS: dict[str, tuple[str, ...]] = {
         *(f"{SCORES}/shaving-wheelchair-pr2.tcs", f"{SCORES}/bathing-bed-pr2.tcs"),
         *("--places", "60", "--drake", "10"),
     ),
+    "plan_success": (
+        *(f"{SCORES}/shaving-wheelchair-pr2.tcs", f"{SCORES}/feeding-wheelchair-pr2.tcs"),
+        f"{SCORES}/bathing-bed-pr2.tcs",
+    ),
     "planning": ("--limit", "20", "--compared", "1", "--seeds", "20"),
     "service": (f"{SCORES}/shaving-wheelchair-pr2.tcs",),
     "ros2": (f"{SCORES}/shaving-wheelchair-pr2.tcs",),
