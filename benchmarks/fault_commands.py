@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import os
 import shutil
 import subprocess
 import sys
@@ -105,6 +106,15 @@ class Command:
     def is_old_or_new(self, folder: Path) -> bool:
         """Return whether the file is not there, or complete."""
         return self.is_whole(folder) or not (self.changes or (folder / self.out).exists())
+
+
+def small_scores(folder: Path) -> tuple[Path, Path]:
+    """Write a small environment and its scores into a folder."""
+    environment = small_environment(folder)
+    make = ("score", "shaving", "--environment", str(environment), "--out", "{out}")
+    variables = {**os.environ, "PYTHONPATH": str(CHECKOUT)}
+    Command("score", make, "scores.tcs").run(folder, variables).communicate()
+    return environment, folder / "scores.tcs"
 
 
 def scoring_commands(environment: Path, scores: Path) -> tuple[Command, ...]:

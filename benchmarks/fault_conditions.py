@@ -1,17 +1,34 @@
-"""Commands on machines that lack something: disk, memory, a home, a warm cache, a worker."""
+"""Run commands on machines that lack something, and count what goes wrong.
+
+Usage: python benchmarks/fault_conditions.py
+
+Each command that writes a file runs with a full disk, too little memory, no home and a folder that
+cannot be written; `tcs score` also beside another process with the same cold cache, and with a Dask
+worker that is killed. Afterwards the same command must end its work. Every count of a fault should
+be 0; the exit code is 1 if one is not.
+"""
 
 from __future__ import annotations
 
 import os
 import resource
 import signal
+import sys
 import tempfile
 import threading
 from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from fault_commands import CHECKOUT, Command, digest, leftovers, scoring_commands
+from fault_commands import (
+    CHECKOUT,
+    Command,
+    digest,
+    leftovers,
+    scoring_commands,
+    small_scores,
+)
+from table import header, parser, record, row, save
 
 COLUMNS = (
     "tries",
@@ -31,6 +48,22 @@ LIMIT_FILE = (4_000, 10_000, 30_000)
 """Largest file that can be written [bytes]: a disk that is full after so many. The semaphores of
 joblib, which are files too, need some dozens."""
 FAULTS = COLUMNS[3:]
+
+
+def main() -> int:
+    """Run every command under every condition and print the counts."""
+    options = parser(__doc__).parse_args()
+    header()
+    with tempfile.TemporaryDirectory() as above:
+        folder = Path(above)
+        environment, scores = small_scores(folder)
+        found = conditions(folder / "trials", environment, scores)
+    for name, counts in found.items():
+        row(name, ", ".join(f"{column} {counts[column]}" for column in COLUMNS))
+    rows = [[name, *(str(counts[c]) for c in COLUMNS)] for name, counts in found.items()]
+    record("conditions", ["", *COLUMNS], rows)
+    save(options)
+    return int(any(counts[fault] for counts in found.values() for fault in FAULTS))
 
 
 def limited(kind: int, most: int) -> Callable[[], None]:
@@ -180,3 +213,7 @@ def killed_worker(
     counts["left over"] += len(leftovers(folder, command))
     counts["other scores in the end"] += not ends_the_same(command, folder, plain, scores)
     return counts
+
+
+if __name__ == "__main__":
+    sys.exit(main())

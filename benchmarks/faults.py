@@ -5,10 +5,8 @@ Usage: python benchmarks/faults.py [--flips 150] [--kernel-flips 20] [--signals 
 `--flips` damages one bit each in the machine code of small functions, `--kernel-flips` in that of
 the kernel, which `tcs score` then has to compile again. `--signals` starts tcs score (also with
 blocks), robustify, report, capability from-ik and population in turn and sends SIGINT, SIGTERM or
-SIGKILL at a random moment (`--only-kill`: SIGKILL alone). Unless `--no-conditions` is given, each
-of them also runs with a full disk, too little memory, no home and a folder that cannot be written,
-and `tcs score` beside another process with the same cold cache, and with a Dask worker that is
-killed. Every count of a fault should be 0; the exit code is 1 if one is not.
+SIGKILL at a random moment (SIGKILL alone: `benchmarks/kills.py`). Every count of a fault should be
+0; the exit code is 1 if one is not.
 """
 
 from __future__ import annotations
@@ -35,9 +33,8 @@ from fault_commands import (
     leftovers,
     scoring_commands,
     small_environment,
+    small_scores,
 )
-from fault_conditions import COLUMNS, conditions
-from fault_conditions import FAULTS as CONDITION_FAULTS
 from numba.core.registry import CPUDispatcher
 from table import header, parser, record, row, save
 
@@ -55,8 +52,6 @@ def main() -> int:
     command_line.add_argument("--flips", type=int, default=150)
     command_line.add_argument("--kernel-flips", type=int, default=20)
     command_line.add_argument("--signals", type=int, default=200)
-    command_line.add_argument("--only-kill", action="store_true")
-    command_line.add_argument("--no-conditions", action="store_true")
     command_line.add_argument("--seed", type=int, default=0)
     options = command_line.parse_args()
     header()
@@ -74,10 +69,7 @@ def main() -> int:
             faults += sum(found[fault] for fault in FAULTS)
         columns = ["", "tries", *FAULTS]
         record("bits", columns, [[n, *(f"{c[k]}" for k in columns[1:])] for n, c in lines])
-        numbers = SIGNALS[-1:] if options.only_kill else SIGNALS
-        faults += signals(folder / "signals", options.signals, rng, numbers)
-        if not options.no_conditions:
-            faults += starved(folder / "conditions")
+        faults += signals(folder / "signals", options.signals, rng, SIGNALS)
     save(options)
     return 1 if faults else 0
 
@@ -271,27 +263,6 @@ SIGNAL_COLUMNS = (
     "still there after the next run",
     "other scores in the end",
 )
-
-
-def starved(folder: Path) -> int:
-    """Run commands where something is missing; return the number of faults."""
-    folder.mkdir()
-    environment, scores = small_scores(folder)
-    found = conditions(folder / "trials", environment, scores)
-    for name, counts in found.items():
-        row(name, ", ".join(f"{column} {counts[column]}" for column in COLUMNS))
-    rows = [[name, *(str(counts[c]) for c in COLUMNS)] for name, counts in found.items()]
-    record("conditions", ["", *COLUMNS], rows)
-    return sum(counts[fault] for counts in found.values() for fault in CONDITION_FAULTS)
-
-
-def small_scores(folder: Path) -> tuple[Path, Path]:
-    """Write a small environment and its scores into a folder."""
-    environment = small_environment(folder)
-    make = ("score", "shaving", "--environment", str(environment), "--out", "{out}")
-    variables = {**os.environ, "PYTHONPATH": str(CHECKOUT)}
-    Command("score", make, "scores.tcs").run(folder, variables).communicate()
-    return environment, folder / "scores.tcs"
 
 
 def signals(folder: Path, tries: int, rng: random.Random, numbers: Sequence[signal.Signals]) -> int:
