@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from tcs.capability.grid import CellArray, MapGrid, yaw_rotation
 from tcs.capability.head import View, head_names, head_view
+from tcs.capability.kept_cells import solved_in_blocks
 from tcs.capability.map import ICM, IHCM, MAX_TORSO_HEIGHTS, CapabilityMap
 from tcs.capability.reach import OnProgress, Reach
 from tcs.capability.visibility import CORRECTED, VISIBILITIES, visibility
 from tcs.errors import GridError, UnknownNameError
+from tcs.files.blocks import BlockFolder
 from tcs.files.quantities import RADIUS
 from tcs.kernel.arrays import FloatArray
 
@@ -33,6 +35,7 @@ def map_from_ik(
     radius: float | None = None,
     view_rule: str = CORRECTED,
     jobs: int = 2,
+    blocks: BlockFolder | None = None,
     on_progress: OnProgress | None = None,
 ) -> CapabilityMap:
     """Return the map of all cells whose base pose reaches the tool.
@@ -45,12 +48,15 @@ def map_from_ik(
             thesis uses 0.9 m for an arm of 0.87 m.
         view_rule: Visibility rule.
         jobs: Number of threads.
+        blocks: Folder in which finished blocks are kept, so that the same call continues after an
+            interrupt; None to keep none.
         on_progress: Called with the number of cells done and of all.
 
     Raises:
         RobotError: If an IHCM is requested and the robot has no head file.
         UnknownNameError: If there is no such map type or rule.
         GridError: If the radius is not positive, or there are too many cells or torso heights.
+        OutputError: If blocks cannot be kept in their folder, or another process is at work there.
 
     Source:
         ITCM thesis, Appendix B. The thesis solves with TRAC-IK; the solver here does not miss
@@ -62,7 +68,7 @@ def map_from_ik(
     radius = reach.length if radius is None else radius
     cells = cells_around(grid, reach.shoulder, radius)
     R_BT, p_BT = grid.tool_in_base(cells)
-    solved = reach.solve(R_BT, p_BT, jobs=jobs, on_progress=on_progress)
+    solved = solved_in_blocks(reach, R_BT, p_BT, blocks, jobs=jobs, on_progress=on_progress)
     rows = np.flatnonzero(solved.reached)
     joints = solved.joints[rows]
     found = finished_map(

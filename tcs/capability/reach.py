@@ -12,6 +12,7 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from tcs.errors import GridError, UnknownNameError
+from tcs.files.memory import check_room
 from tcs.files.paths import data_reference
 from tcs.files.quantities import MAP_STEP
 from tcs.kernel.arrays import BoolArray, FloatArray
@@ -74,7 +75,9 @@ class Reach:
             GridError: If the torso height is out of range or not finite, or the step is not
                 positive.
             UnknownNameError: If there is no measure of that name.
+            MemoryError: If the address space is limited, and too little is left.
         """
+        check_room()
         robot.require_seven_joints("a capability map")
         self.robot, self.measure = robot, measure
         self.head = head

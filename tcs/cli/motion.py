@@ -171,6 +171,8 @@ def motions(
         Path | None, typer.Option(help="File to write.", show_default="FILE.motions")
     ] = None,
     seed: options.Seed = 0,
+    blocks: options.Blocks = None,
+    restart: options.Restart = False,
     jobs: options.Jobs = 2,
     as_json: options.Json = False,
 ) -> None:
@@ -183,6 +185,7 @@ def motions(
     from tcs.placement.store import motion_path, save_motions
 
     path = out or motion_path(file)
+    kept = options.block_folder(blocks, restart)
     check_writable(path, [file])
     loaded = tcs.load(file)
     settings = observed_settings(observed or (), loaded.observed_axes)
@@ -196,6 +199,7 @@ def motions(
             table=table,
             seed=seed,
             jobs=jobs,
+            blocks=kept,
             on_progress=on_progress,
             on_compile=terminal.note_compiling,
         )

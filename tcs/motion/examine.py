@@ -19,12 +19,14 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from tcs.errors import TcsError
+from tcs.files.blocks import BlockFolder, opened_if
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import is_compiled
 from tcs.kernel.motion.connect import connect
 from tcs.kernel.motion.random import random_state
 from tcs.kernel.motion.trees import Trees, new_trees
 from tcs.motion.approach import Access, accesses, first_accesses
+from tcs.motion.kept_outcomes import KeptOutcomes, Outcomes, outcomes_key, table_of
 from tcs.motion.plans import ENTRY
 from tcs.motion.stops import BodyPair, Stop, StopGrid
 from tcs.placement.scoring.rebuild import rebuild_scene
@@ -43,8 +45,6 @@ ITERATIONS = 5000
 SLICE = 16
 """Number of configurations that a thread examines at a time."""
 
-Outcomes = list[tuple[MotionOutcome, BodyPair | None]]
-
 
 def examine(
     file: ScoreFile,
@@ -55,6 +55,7 @@ def examine(
     table: int | None = None,
     seed: int = 0,
     jobs: int = 2,
+    blocks: BlockFolder | None = None,
     on_progress: Callable[[int, int], None] | None = None,
     on_compile: Callable[[], None] | None = None,
 ) -> MotionFile:
@@ -69,12 +70,15 @@ def examine(
         table: Number of the table, by default the nominal one.
         seed: Seed of the planner.
         jobs: Number of threads; the outcomes do not depend on it.
+        blocks: Folder in which finished blocks are kept, so that the same call continues after an
+            interrupt; None to keep none.
         on_progress: Called with the number of examined configurations and their total.
         on_compile: Called before the planner compiles, if it has to.
 
     Raises:
         StoreMismatchError: If the models differ from those the file was made from.
         RobotError: If a velocity limit of the arm is unknown.
+        OutputError: If blocks cannot be kept in their folder, or another process is at work there.
         TcsError: If `within`, `most`, `sample` or `jobs` is out of range.
     """
     if jobs < 1:
@@ -87,14 +91,10 @@ def examine(
     sets = file.tables[number].sets
     rows = drawn(worth_examining(sets, within, most), sample, seed)
     arms = [StopGrid.of(job, scene, job.scored_grid, lowered) for job, scene, lowered in built]
-    slices = [rows[start : start + SLICE] for start in range(0, len(rows), SLICE)]
-    work = (delayed(_examine_slice)(arms, sets, slice_, number, seed) for slice_ in slices)
-    outcomes: list[Outcomes] = []
-    for found in Parallel(jobs, prefer="threads", return_as="generator")(work):
-        outcomes += found
-        if on_progress is not None:
-            on_progress(len(outcomes), len(rows))
-    examined = _table_of(sets.candidates[rows], outcomes, sets.weights.size)
+    with opened_if(blocks, lambda: outcomes_key(arms, seed)) as opened:
+        kept = None if opened is None else KeptOutcomes(opened, number)
+        outcomes = _examined(arms, sets, rows, number, seed, jobs, kept, on_progress)
+    examined = table_of(sets.candidates[rows], outcomes, sets.weights.size)
     tables: list[MotionTable | None] = [None] * len(file.tables)
     tables[number] = examined
     metadata = {
@@ -210,6 +210,45 @@ def drawn(rows: NDArray[np.intp], sample: int | None, seed: int) -> NDArray[np.i
     return np.sort(np.random.default_rng(seed).choice(rows, sample, replace=False))
 
 
+def _examined(
+    arms: Sequence[StopGrid],
+    sets: SetTable,
+    rows: NDArray[np.intp],
+    table: int,
+    seed: int,
+    jobs: int,
+    kept: KeptOutcomes | None,
+    on_progress: Callable[[int, int], None] | None,
+) -> list[Outcomes]:
+    """Return the outcomes at some candidates of a table, kept ones and new ones."""
+    slices = [rows[start : start + SLICE] for start in range(0, len(rows), SLICE)]
+    found: dict[int, list[Outcomes]] = {}
+    done = 0
+
+    def add(number: int, outcomes: list[Outcomes]) -> None:
+        nonlocal done
+        found[number] = outcomes
+        done += len(outcomes)
+        if on_progress is not None:
+            on_progress(done, len(rows))
+
+    for number, slice_ in enumerate(slices):
+        if kept is None:
+            break
+        before = kept.load(sets.candidates[slice_], sets.reached[slice_])
+        if before is not None:
+            add(number, before)
+    missing = [number for number in range(len(slices)) if number not in found]
+    work = (delayed(_examine_slice)(arms, sets, slices[number], table, seed) for number in missing)
+    parallel = Parallel(jobs, prefer="threads", return_as="generator")
+    for number, outcomes in zip(missing, parallel(work), strict=True):
+        slice_ = slices[number]
+        if kept is not None:
+            kept.save(sets.candidates[slice_], sets.reached[slice_], outcomes)
+        add(number, outcomes)
+    return list(itertools.chain.from_iterable(found[number] for number in range(len(slices))))
+
+
 def _examine_slice(
     arms: Sequence[StopGrid], sets: SetTable, rows: NDArray[np.intp], table: int, seed: int
 ) -> list[Outcomes]:
@@ -298,20 +337,3 @@ class _Reachable:
         stop, starts = self.stop, np.array(self.postures)
         count = connect(stop.motion, stop.work, stop.trees, starts, np.array(ends), iterations, 0)
         return int(stop.trees.ends[1]) if count else None
-
-
-def _table_of(
-    configurations: NDArray[np.int32], outcomes: list[Outcomes], goals: int
-) -> MotionTable:
-    """Return outcomes as a table."""
-    names: dict[BodyPair, int] = {}
-    outcome = np.zeros((len(outcomes), goals), np.uint8)
-    pair = np.full((len(outcomes), goals), -1, np.int32)
-    for row, of_goals in enumerate(outcomes):
-        for goal, (result, bodies) in enumerate(of_goals):
-            outcome[row, goal] = result
-            if bodies is not None:
-                pair[row, goal] = names.setdefault(bodies, len(names))
-    return MotionTable(
-        configurations=configurations, outcome=outcome, pair=pair, pair_names=tuple(names)
-    )

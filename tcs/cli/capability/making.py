@@ -40,12 +40,15 @@ def from_ik(
         str, typer.Option(help="Tilts of the tool: side, top, side+top or all.")
     ] = "side+top",
     radius: Radius = None,
+    blocks: options.Blocks = None,
+    restart: options.Restart = False,
     jobs: options.Jobs = 2,
     as_json: options.Json = False,
 ) -> None:
     """Make a map (IHCM or ICM) by inverse kinematics of every cell around the tool."""
     from tcs.capability import map_from_ik
 
+    kept = options.block_folder(blocks, restart)
     files.check()
     cells = grid.grid(grasps)
     reach = grid.reach(scores.robot, scores.measure, scores.head)
@@ -53,7 +56,7 @@ def from_ik(
     with terminal.progress_bar("cells") as on_progress:
         capability = map_from_ik(
             reach, cells, map_type=map_type, radius=radius, view_rule=scores.visibility, jobs=jobs,
-            on_progress=on_progress,
+            blocks=kept, on_progress=on_progress,
         )  # fmt: skip
     seconds = time.perf_counter() - begun
     files.write(capability)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tcs.errors import TcsError
 from tcs.files.blocks import BlockFolder
 from tcs.files.mapped import chunks, large_zeros, release
+from tcs.files.memory import check_room
 from tcs.kernel.analytic.solver import is_outside
 from tcs.kernel.cache import is_compiled
 from tcs.kernel.dexterity import DEFAULT_MEASURE
@@ -182,6 +183,7 @@ def warm_up(
 
     Raises:
         ArmClassError: If there are approaches, and the arm has no closed form.
+        MemoryError: If the address space is limited, and too little is left.
     """
     entries = [_ENTRIES[ik_of(problem)] if problem.joints == 7 else _SIX_JOINTS]
     if approaches is not None:
@@ -189,6 +191,7 @@ def warm_up(
         entries.append(ENTRY)
     if on_compile is not None and not all(map(is_compiled, entries)):
         on_compile()
+    check_room()
     begun = time.perf_counter()
     Work(problem, gripper_contacts(problem)).warm_up()
     seconds = time.perf_counter() - begun

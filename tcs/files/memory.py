@@ -1,0 +1,72 @@
+"""The memory that a process may still take, where its address space is limited (`ulimit -v`)."""
+
+from __future__ import annotations
+
+import os
+import resource
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from types import ModuleType
+
+_MEGABYTE = 1024**2
+LIBRARIES = {
+    "numba": 200 * _MEGABYTE,
+    "pydrake": 200 * _MEGABYTE,
+    "scipy.linalg": 150 * _MEGABYTE,
+    "scipy.special": 150 * _MEGABYTE,
+}
+"""Modules that, loaded without enough room, wait for ever or end the process, and the address space
+that they take at most, with what they load [bytes]."""
+CODE = 100 * _MEGABYTE
+"""Address space that loading or compiling machine code takes at most, with its threads [bytes]."""
+
+
+def is_limited() -> bool:
+    """Return whether the address space of this process is limited."""
+    return resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY
+
+
+class _RoomFinder:
+    """Finds no module, but refuses to look for one of `LIBRARIES` without room."""
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> None:
+        """Check the room.
+
+        Raises:
+            MemoryError: If the address space is limited, and too little is left.
+        """
+        if fullname in LIBRARIES:
+            check_room(LIBRARIES[fullname])
+
+
+def guard_imports() -> None:
+    """Check the room before each module of `LIBRARIES`, where the address space is limited.
+
+    The BLAS of SciPy, for one, asks for its buffers again and again until it gets them.
+    """
+    if is_limited() and not any(isinstance(finder, _RoomFinder) for finder in sys.meta_path):
+        sys.meta_path.insert(0, _RoomFinder())
+
+
+def check_room(needed: int = CODE) -> None:
+    """Check that a limit leaves room, before code that ends the process where there is none.
+
+    Args:
+        needed: Address space that is needed [bytes].
+
+    Raises:
+        MemoryError: If the address space is limited and less is left.
+    """
+    if not is_limited():
+        return
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+    except (OSError, ValueError):
+        # Another system, which does not tell.
+        return
+    left = resource.getrlimit(resource.RLIMIT_AS)[0] - pages * os.sysconf("SC_PAGE_SIZE")
+    if left < needed:
+        raise MemoryError(f"{left:,} bytes of address space are left; {needed:,} are needed")
