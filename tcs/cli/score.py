@@ -241,6 +241,7 @@ def score(
             )
         if refine:
             result["refinement"] = refined_in_place(path, jobs)
+        result = _with_places(result)
         terminal.print_result(result, tables.report_scores, as_json=as_json)
         if refine and not as_json:
             report_refined({**result["refinement"], "file": path})
@@ -261,7 +262,15 @@ def score(
     result = files.score_observed_to_file(
         task, environment, robot, path, observation, **scoring_options
     )
-    terminal.print_result(result, tables.report_observed, as_json=as_json)
+    terminal.print_result(_with_places(result), tables.report_observed, as_json=as_json)
+
+
+def _with_places(result: dict[str, Any]) -> dict[str, Any]:
+    """Return the summary of a saved score file with the places of its best sets in words."""
+    from tcs.output.words import summary_in_words
+    from tcs.placement.store import load_scores
+
+    return summary_in_words(load_scores(Path(result["file"])), result)
 
 
 @expand_options

@@ -185,13 +185,14 @@ class SceneWork:
 
     def _held(self, scored: ScoreFile) -> dict[str, Any]:
         """Hold a new score file and return its summary."""
+        from tcs.output.words import summary_in_words
         from tcs.placement.scoring import summary
 
         entry = self._files.add_made(scored).entry
         return {
             "task": entry.task,
             "environment": entry.environment,
-            **summary(scored),
+            **summary_in_words(scored, summary(scored)),
             "file": entry.file,
             "file_bytes": entry.bytes,
         }

@@ -329,6 +329,9 @@ def test_alternatives_are_listed(tcs_command, small_file):
     assert set(result["alternatives"][0]["trades"]) == {
         "reachability", "manipulability", "cost", "utility", "net_utility", "places",
     }  # fmt: skip
+    assert [len(one["places"]) for one in result["alternatives"]] == [
+        len(one["members"]) for one in result["alternatives"]
+    ]
     assert "base poses" in tcs_command(*words).out
 
 

@@ -4,7 +4,8 @@ import { MARKS, grouped } from "./marks.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 const SCALE = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]]; // viridis
-const COLOURS = { person: "#e3a57f", furniture: "#7b8794", blocked: [196, 202, 209], unknown: [246, 234, 215], added: "#8a7350", region: "#b3003b" };
+const COLOURS = { person: "#e3a57f", furniture: "#7b8794", blocked: [196, 202, 209], added: "#8a7350", region: "#b3003b" };
+export const IN_SOME_FILES = ["success", "motion"]; // colours that only some files have, and only in places
 const HANDLE = 0.62; // distance of the handle from the middle of the base [m]
 const DRAG = 4; // movement that makes a click a drag [px]
 const UNKNOWN_BASE = [[0.3, 0.3], [-0.3, 0.3], [-0.3, -0.3], [0.3, -0.3]]; // until the outline is there [m]
@@ -27,7 +28,9 @@ export function paint(canvas, floor, score) {
     for (let j = 0; j < rows; j++) {
       const free = floor.free[i][j];
       const value = values?.[i][j] ?? null;
-      const shown = !free ? COLOURS.blocked : value === null ? COLOURS.unknown : value > 0 ? colour(value / most) : [255, 255, 255];
+      // White: nothing is reached, or nothing was computed; where something was, none of it has a colour too.
+      const isShown = value !== null && (value > 0 || IN_SOME_FILES.includes(score));
+      const shown = !free ? COLOURS.blocked : isShown ? colour(value / most) : [255, 255, 255];
       pixels.data.set([...shown, 255], 4 * ((rows - 1 - j) * columns + i));
     }
   }

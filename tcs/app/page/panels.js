@@ -1,5 +1,6 @@
 // The answer beside the map: goals, explanations, suggested places, and the details for experts.
 
+import { IN_SOME_FILES } from "./map.js";
 import { changes, goalName, goalText, named, setting, t } from "./texts.js";
 
 export const by = (id) => document.getElementById(id);
@@ -99,7 +100,7 @@ export function showLegend(score) {
   scale.append(`${t(`legend.${score}.low`)} `);
   made("span", undefined, scale, { class: "scale" });
   scale.append(t(`legend.${score}.high`));
-  const unknown = ["success", "motion"].includes(score) ? [["unknown", "unknown"]] : [];
+  const unknown = IN_SOME_FILES.includes(score) ? [["unknown", "unknown"]] : [];
   for (const [name, colour] of [...unknown, ["blocked", "blocked"], ["person", "person"], ["furniture", "furniture"], ["goal", "goal"]]) {
     const item = made("li", undefined, list);
     made("span", undefined, item, { class: colour });

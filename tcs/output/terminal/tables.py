@@ -23,6 +23,7 @@ from tcs.output.words import (
     goal_text,
     percentage,
     person_text,
+    place_in_line,
     reason_of,
     scores_text,
     settings_text,
@@ -126,6 +127,8 @@ def report_scores(result: Mapping[str, Any]) -> None:
             continue
         scores = scores_text(best["reachability"], best["manipulability"], result["measure"])
         out.print(f"{what}: {scores}")
+        for line in stop_places(best.get("places", ())):
+            out.print(line)
         out.print(members_table(best["members"]))
     out.print(f"wrote {result['file']}")
 
@@ -187,6 +190,9 @@ def report_choice(result: Mapping[str, Any]) -> None:
     if "executable" in result:
         out.print(_executable_text(result["executable"]))
     if "alternatives" in result:
+        for number, one in enumerate((result, *result["alternatives"]), 1):
+            if any(one["places"]):
+                out.print(f"Set {number}: {'; '.join(map(place_in_line, one['places']))}.")
         out.print(_alternatives_table(result))
     if "person" in result:
         out.print(f"scored for {person_text(result['person'])}")
@@ -239,8 +245,18 @@ def _executable_text(found: Mapping[str, Any]) -> str:
 
 def _alternatives_table(result: Mapping[str, Any]) -> Table:
     """Return the offered sets, the best first, and what each trades against the best."""
+    has_places = any(place for one in (result, *result["alternatives"]) for place in one["places"])
     table = new_table(
-        *("set", "base poses (x y heading)", ">P_R", ">P_M", ">travel", ">net utility", "moves"),
+        *(
+            "set",
+            *(["where"] if has_places else []),
+            "base poses (x y heading)",
+            ">P_R",
+            ">P_M",
+            ">travel",
+            ">net utility",
+            "moves",
+        ),
     )
     for number, one in enumerate((result, *result["alternatives"]), 1):
         poses = "; ".join(

@@ -36,8 +36,12 @@ _PAUSE = """<button type="button" id="tcs-pause">Pause</button><script>{
 const button = document.getElementById("tcs-pause");
 const say = () => { button.textContent = viewer.animator.playing ? "Pause" : "Play"; };
 button.onclick = () => {
-  if (viewer.animator.playing) viewer.animator.pause();
-  else viewer.animator.play();
+  const animator = viewer.animator;
+  if (animator.playing) animator.pause();
+  else {
+    if (animator.time >= animator.duration - 0.05) animator.reset();
+    animator.play();
+  }
   say();
 };
 setInterval(say, 500);

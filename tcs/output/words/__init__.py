@@ -6,7 +6,7 @@ for the command line, reports, the viewer and pictures. Nothing here draws, simu
 
 from __future__ import annotations
 
-from tcs.output.words.answers import choice_in_words, explanation_in_words
+from tcs.output.words.answers import choice_in_words, explanation_in_words, summary_in_words
 from tcs.output.words.assignment import assign_goals, assigned_goals
 from tcs.output.words.bodies import body_name, frame_name, pair_text
 from tcs.output.words.configurations import (
@@ -96,5 +96,6 @@ __all__ = [
     "settings_text",
     "signed",
     "stop_places",
+    "summary_in_words",
     "text_of_goal",
 ]

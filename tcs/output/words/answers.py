@@ -1,10 +1,11 @@
-"""Answers of `tcs select` and `tcs explain` as plain containers, with their words.
+"""Answers of `tcs score`, `tcs select` and `tcs explain` as plain containers, with their words.
 
 The command line and the service return the same.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from tcs.output.words.goals import goal_names
@@ -24,16 +25,45 @@ def choice_in_words(file: ScoreFile, choice: selection.Choice) -> dict[str, Any]
         choice: The choice.
 
     Returns:
-        What `Choice.to_json` returns; and `places`: where each member is relative to the person, in
-        the order of the tour, "" without a person.
+        What `Choice.to_json` returns; and `places`, in each alternative too: where each member is
+        relative to the person, in the order of the tour, "" without a person.
     """
-    places = member_places(
+    result = {**choice.to_json(file.metadata["measure"]), "places": _places(file, choice)}
+    if choice.alternatives:
+        result["alternatives"] = [
+            {**one, "places": _places(file, other)}
+            for one, other in zip(result["alternatives"], choice.alternatives, strict=True)
+        ]
+    return result
+
+
+def summary_in_words(file: ScoreFile, summary: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the summary of a score file with the places of its best sets.
+
+    Args:
+        file: The score file.
+        summary: Its main figures, of `tcs.placement.scoring.summary` and more.
+
+    Returns:
+        The same, and in `best` and `best_single` the `places` of the members relative to the
+        person, "" without a person.
+    """
+    result, sets = dict(summary), file.nominal.sets
+    for key, members in (("best", sets.best), ("best_single", sets.best_single)):
+        if result[key] is not None:
+            places = member_places(file, file.nominal_index, members)
+            result[key] = {**result[key], "places": places}
+    return result
+
+
+def _places(file: ScoreFile, choice: selection.Choice) -> list[str]:
+    """Return where each member of a choice is relative to the person, in the order of the tour."""
+    return member_places(
         file,
         choice.match.index if choice.match else 0,
         [choice.indices[i] for i in choice.order],
         [choice.members[i] for i in choice.order],
     )
-    return {**choice.to_json(file.metadata["measure"]), "places": places}
 
 
 def explanation_in_words(file: ScoreFile, explanation: Explanation) -> dict[str, Any]:

@@ -6,7 +6,13 @@ import itertools
 import math
 
 import tcs
-from tcs.output.words import choice_in_words, explanation_in_words, relative_place
+from tcs.output.terminal.tables import report_choice
+from tcs.output.words import (
+    choice_in_words,
+    explanation_in_words,
+    relative_place,
+    summary_in_words,
+)
 from tests.placement.store.example import score_file
 
 # No axis of the body through base positions of the grid: rounding would decide on the sides.
@@ -33,6 +39,27 @@ def test_each_stop_has_its_place():
         assert len(set(found["places"])) == 2
         turned.add(choice.order == tuple(sorted(choice.order)))
     assert turned == {True, False}
+
+
+def test_alternatives_have_places_before_their_coordinates(capsys):
+    here = tcs.InitialConfiguration(base_x=0.0, base_y=0.0, base_yaw=0.0, torso=0.0)
+    found = choice_in_words(FILE, tcs.select(FILE, here, top=tcs.Top(count=3, min_apart=0.1)))
+    assert len(found["alternatives"]) == 2
+    for one in found["alternatives"]:
+        assert one["places"] == [place(member) for member in one["members"]]
+    report_choice(found)
+    printed = capsys.readouterr().out
+    assert 0 < printed.index("Set 1: ") < printed.index("Set 3: ") < printed.index("base poses")
+
+
+def test_the_best_sets_of_a_summary_have_places():
+    sets, grid = FILE.nominal.sets, FILE.configurations
+    found = summary_in_words(FILE, {"best": {"reachability": 1.0}, "best_single": {}, "goals": 5})
+    for key, members in (("best", sets.best), ("best_single", sets.best_single)):
+        expected = [place(grid.configuration(h).to_json()) for h in members]
+        assert found[key]["places"] == expected
+    assert (found["best"]["reachability"], found["goals"]) == (1.0, 5)
+    assert summary_in_words(FILE, {"best": None, "best_single": None})["best"] is None
 
 
 def test_explanations_name_goals_and_places():
