@@ -245,18 +245,8 @@ def _executable_text(found: Mapping[str, Any]) -> str:
 
 def _alternatives_table(result: Mapping[str, Any]) -> Table:
     """Return the offered sets, the best first, and what each trades against the best."""
-    has_places = any(place for one in (result, *result["alternatives"]) for place in one["places"])
     table = new_table(
-        *(
-            "set",
-            *(["where"] if has_places else []),
-            "base poses (x y heading)",
-            ">P_R",
-            ">P_M",
-            ">travel",
-            ">net utility",
-            "moves",
-        ),
+        *("set", "base poses (x y heading)", ">P_R", ">P_M", ">travel", ">net utility", "moves"),
     )
     for number, one in enumerate((result, *result["alternatives"]), 1):
         poses = "; ".join(

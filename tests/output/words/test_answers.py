@@ -41,7 +41,8 @@ def test_each_stop_has_its_place():
     assert turned == {True, False}
 
 
-def test_alternatives_have_places_before_their_coordinates(capsys):
+def test_alternatives_have_places_before_their_coordinates(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")
     here = tcs.InitialConfiguration(base_x=0.0, base_y=0.0, base_yaw=0.0, torso=0.0)
     found = choice_in_words(FILE, tcs.select(FILE, here, top=tcs.Top(count=3, min_apart=0.1)))
     assert len(found["alternatives"]) == 2
@@ -49,6 +50,10 @@ def test_alternatives_have_places_before_their_coordinates(capsys):
         assert one["places"] == [place(member) for member in one["members"]]
     report_choice(found)
     printed = capsys.readouterr().out
+    [heading] = [line.split() for line in printed.splitlines() if "utility   moves" in line]
+    [row] = [line.split() for line in printed.splitlines() if line.split()[:1] == ["3"]]
+    moves = found["alternatives"][1]["moves"]
+    assert (heading[0], heading[-1], row[-1]) == ("set", "moves", ", ".join(moves) or "-")
     assert 0 < printed.index("Set 1: ") < printed.index("Set 3: ") < printed.index("base poses")
 
 
