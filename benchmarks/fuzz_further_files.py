@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import struct
 import tempfile
 from pathlib import Path
@@ -20,6 +21,19 @@ sex: female
 stature_percentile: 5
 mass_percentile: 60
 posture: {head_turn_deg: 10, elbow_flexion_left_deg: 20}
+"""
+
+PEOPLE = """\
+sex,stature,mass_percentile,sitting_height,age
+female,1.62,50,0.85,
+male,1.9,,,
+female,,5,,
+male,1.3,60,,9
+"""
+
+LOCATED = """\
+{"table": "thesis", "pose": {"x": 1.0, "y": 0.2, "yaw_deg": 6.0},
+ "covariance": [[0.0004, 0.0001, 0], [0.0001, 0.0004, 0], [0, 0, 0.0004]]}
 """
 
 CONSTRAINTS = """\
@@ -51,6 +65,8 @@ def write_texts(folder: Path) -> None:
     texts = {
         "person.yaml": PERSON,
         "constraints.yaml": CONSTRAINTS,
+        "people.csv": PEOPLE,
+        "located.json": LOCATED,
         "cloud.ply": PLY + rows,
         "tool.yaml": (data_folder() / "models" / "tools" / "spoon.yaml").read_text("utf-8"),
     }
@@ -88,6 +104,7 @@ def prepare(folder: Path) -> None:
 def _write_motions(folder: Path) -> None:
     """Write the motions of scores, a plan, and a block."""
     import tcs
+    from tcs.files.blocks import MANIFEST
     from tcs.motion import examine, plan, save_plan
     from tcs.placement.scoring import BlockFolder
     from tcs.placement.store import save_motions
@@ -98,7 +115,9 @@ def _write_motions(folder: Path) -> None:
     with tempfile.TemporaryDirectory(dir=folder) as blocks:
         tcs.score(*three(folder), blocks=BlockFolder(Path(blocks)))
         (block,) = Path(blocks).rglob("*.block")
-        block.replace(folder / "kept.block")
+        shutil.copy(block, folder / "kept.block")
+        shutil.copy(block, folder)
+        shutil.copy(block.with_name(MANIFEST), folder)
 
 
 def bag_mutated(content: bytes, rng: np.random.Generator) -> bytes:
@@ -174,6 +193,32 @@ def _read_person(path: Path) -> Any:
     from tcs.model.people import load_person
 
     return load_person(path)
+
+
+def _read_people(path: Path) -> Any:
+    from tcs.model.people import load_people, scales_of_people
+
+    people = load_people(path)
+    scales_of_people(people)
+    return people
+
+
+def _read_located(path: Path) -> Any:
+    from tcs.perception.located import load_located
+
+    return load_located(path)
+
+
+def _located(path: Path, _: int) -> None:
+    found = _read_located(path)
+    found.in_task_frame()
+    found.base_in(found.pose)
+
+
+def _read_manifest(path: Path) -> Any:
+    from tcs.files.blocks import load_manifest
+
+    return load_manifest(path)
 
 
 def _read_tool(path: Path) -> Any:
@@ -274,6 +319,10 @@ ALL_TYPES = (
     *FILE_TYPES,
     FileType("bag (ROS 1)", "arm.bag", bag_mutated, _read_bag, _bag),
     FileType("person file", "person.yaml", mutations.yaml_mutated, _read_person, _person),
+    FileType(
+        "people (CSV)", "people.csv", mutations.csv_mutated, _read_people, _read_only(_read_people)
+    ),
+    FileType("located table", "located.json", json_mutated, _read_located, _located),
     FileType("tool file", "tool.yaml", mutations.yaml_mutated, _read_tool, _tool),
     FileType(
         "constraints file",
@@ -291,5 +340,12 @@ ALL_TYPES = (
     ),
     FileType("plan (JSON)", "plan.json", json_mutated, _read_plan, _plan),
     FileType("block", "kept.block", mutations.joblib_mutated, _read_block, _read_only(_read_block)),
+    FileType(
+        "manifest of blocks",
+        "manifest.json",
+        json_mutated,
+        _read_manifest,
+        _read_only(_read_manifest),
+    ),
 )
 """Every type of file that a user can hand to `tcs`."""

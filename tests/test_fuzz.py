@@ -54,6 +54,7 @@ def folder(scripts, tmp_path_factory):
     save_motions(made_in / "scores.tcs.motions", motion_file(motion_table(sets, sets.reached)))
     save_plan(made_in / "plan.json", small_plan())
     write_block(made_in / "kept.block", scripts[1].BLOCK)
+    write_manifest(made_in)
     save_map(made_in / "map.tcm", small_map([[0, 0, 0, 0, 0], [1, 2, 3, 4, 1]], [0.5, 0.2], [1, 1]))
     save_arplace(made_in / "model.arp", model())
     save_probability_map(made_in / "map.apm", query(model()).map)
@@ -87,6 +88,15 @@ def small_plan():
     )
 
 
+def write_manifest(folder):
+    """Write a finished run of one block."""
+    from tcs.files.blocks import Blocks
+
+    blocks = Blocks(folder, "key")
+    blocks.save("one", {})
+    blocks.finish()
+
+
 def write_block(path, rows):
     """Write a block of random scores."""
     from tcs.files.blocks import Blocks
@@ -105,7 +115,7 @@ def write_block(path, rows):
     (path.parent / "0000000000.block").replace(path)
 
 
-@pytest.mark.parametrize("number", range(25))
+@pytest.mark.parametrize("number", range(28))
 def test_no_mutant_ends_in_anything_but_one_line(scripts, folder, number):
     fuzz, fuzz_files, _ = scripts
     file_type = fuzz_files.ALL_TYPES[number]
@@ -130,7 +140,7 @@ def test_no_mutant_ends_in_anything_but_one_line(scripts, folder, number):
 
 
 def test_every_type_has_its_entry(scripts):
-    assert len(scripts[1].ALL_TYPES) == 25
+    assert len(scripts[1].ALL_TYPES) == 28
 
 
 def test_a_mutant_is_the_same_in_every_run(scripts, folder):

@@ -68,13 +68,14 @@ class Located:
         matrix = np.array(self.covariance, dtype=np.float64)
         if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
             raise PerceptionError("the covariance of a located table must have 3 x 3 numbers.")
+        # Before the eigenvalues, whose sums would overflow.
+        if np.abs(matrix).max() > _MOST_VARIANCE:
+            raise PerceptionError(f"a variance of a located table exceeds {_MOST_VARIANCE:g}.")
         least = float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T))[0])
         if not np.allclose(matrix, matrix.T, atol=1e-9) or least < -1e-12:
             raise PerceptionError(
                 "the covariance of a located table must be symmetric and positive semidefinite."
             )
-        if matrix.max() > _MOST_VARIANCE:
-            raise PerceptionError(f"a variance of a located table exceeds {_MOST_VARIANCE:g}.")
         matrix.flags.writeable = False
         object.__setattr__(self, "covariance", matrix)
 

@@ -61,6 +61,7 @@ def test_a_located_table_is_read_as_it_was_written(tmp_path):
         {"covariance": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]},
         {"covariance": [[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]},
         {"covariance": [[1e6, 0, 0], [0, 1, 0], [0, 0, 1]]},
+        {"covariance": [[1e308, 0, 0], [0, 1e308, 0], [0, 0, 1]]},
         {"covariance": [1, 2, 3]},
         {"pose": {"x": 1}},
     ],
