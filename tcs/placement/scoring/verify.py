@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from tcs.errors import TcsError
 from tcs.files.mapped import large_zeros
+from tcs.files.memory import check_room
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scans
 from tcs.placement.scoring.drake_check import (
@@ -172,6 +173,7 @@ def verify(
         StoreMismatchError: If the models differ from those the file was made from.
         TcsError: If a number is negative, `jobs` is not positive, or there is a limit without
             `strata`.
+        MemoryError: If the address space is limited, and too little is left.
     """
     if pairs < 0 or dense < 0:
         raise TcsError(f"verify: pairs is {pairs}, dense is {dense}; neither may be negative.")
@@ -196,6 +198,8 @@ def verify(
             on_progress(next(count), total)
 
     findings = checker.stored(reached, step) + checker.refined(of_refined, step)
+    # The machine code of the scans is loaded now.
+    check_room()
     begun = time.perf_counter()
     hits = {r: checker.hits(part, step) for r, part in unreached.items()}
     scan_seconds = time.perf_counter() - begun
