@@ -102,7 +102,8 @@ def fit_triangles(body: str, triangles: FloatArray, target: Target) -> Fit:
     single = best_candidate(points, np.eye(3)[None])
     shapes = [enclose(body, points, single.kind, single.R)]
     if _mean_protrusion(points, single.volume - hull) > _SLACK * target.protrusion:
-        shapes = _covering(body, triangles, points, target)
+        # Without any, a long, thin part has nothing inside that is as wide as the voxels.
+        shapes = _covering(body, triangles, points, target) or shapes
     shapes += fillers(body, tuple(shapes), triangles)
     return Fit(primitives=tuple(shapes), hull=hull, union=union_volume(shapes))
 
@@ -118,7 +119,7 @@ def _mean_protrusion(points: FloatArray, excess: float) -> float:
 def _covering(
     body: str, triangles: FloatArray, points: FloatArray, target: Target
 ) -> list[Primitive]:
-    """Return shapes that cover a surface with the given corners of its hull."""
+    """Return shapes that cover a surface with the given corners of its hull; maybe none."""
     rng = np.random.default_rng(SEED)
     size = float(np.ptp(points, axis=0).max())
     pitch = max(target.protrusion / PER_PROTRUSION, size / ACROSS)
@@ -132,4 +133,4 @@ def _covering(
     if target.patches:
         bare = pieces[~contain(shapes, pieces)]
         shapes += patches(body, solid, target.protrusion, target.patches, tried, bare, rng)
-    return reduced(body, shapes, pieces, inside)
+    return reduced(body, shapes, pieces, inside) if shapes else []

@@ -69,6 +69,15 @@ def test_l_shape_needs_two_boxes():
     assert fit.union == pytest.approx(0.008, rel=0.07)
 
 
+def test_a_part_too_thin_for_voxels_gets_one_shape():
+    """A box with a corner of one triangle far away: nothing inside is as wide as the voxels."""
+    surface = triangles_of(box_at((0.05, 0.1, 0.2)))
+    surface[0, 0] = [10.0, 0.05, 0.0]
+    fit = fit_triangles("b", surface, Target(protrusion=0.01, max_shapes=8))
+    assert len(fit.primitives) == 1
+    assert enclosed(fit.primitives, surface).all()
+
+
 def test_long_triangles_are_cut():
     """A tube of long triangles; shapes that each enclose a part of some follow it closely."""
     tube = triangles_of(trimesh.creation.cylinder(0.06, 0.2, sections=8))
