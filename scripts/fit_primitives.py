@@ -35,6 +35,7 @@ from tcs.files.paths import data_folder
 from tcs.model.robots import RobotFile, load_robot, read_primitives, write_primitives
 from tcs.model.robots.fitting import (
     Part,
+    Spots,
     Target,
     fit_robot,
     refit,
@@ -74,7 +75,8 @@ def main() -> int:
             print_blocked(robot)
         elif "--tighten" in sys.argv:
             splits = {body: int(text) for body, text in more} or splits_of(robot)
-            shapes = tightened(robot, read_primitives(Path(robot.primitives)), splits)
+            shapes = read_primitives(Path(robot.primitives))
+            shapes = tightened(robot, shapes, splits, spots_of(robot))
             write_primitives(Path(robot.primitives), shapes)
             print_blocked(robot)
         elif more:
@@ -97,7 +99,8 @@ def rewrite_primitives(robot: RobotFile) -> None:
     )
     shapes = [p for f in fits for p in f.fit.primitives]
     shapes = refit_parts(robot, shapes, parts_of(robot))
-    write_primitives(Path(robot.primitives), tightened(robot, shapes, splits_of(robot)))
+    shapes = tightened(robot, shapes, splits_of(robot), spots_of(robot))
+    write_primitives(Path(robot.primitives), shapes)
     print("| body | shapes | hull [l] | union [l] | excess |")
     print("|---|---|---|---|---|")
     for found in fits:
@@ -137,6 +140,15 @@ def splits_of(robot: RobotFile) -> dict[str, int]:
         body: fit["splits"]
         for body, fit in _fits(robot).items()
         if isinstance(fit, dict) and "splits" in fit
+    }
+
+
+def spots_of(robot: RobotFile) -> dict[str, Spots]:
+    """Return where FITS says that shapes of bodies of a robot have to be the closest."""
+    return {
+        body: [(float(x), float(y), float(z), float(r)) for x, y, z, r in fit["spots"]]
+        for body, fit in _fits(robot).items()
+        if isinstance(fit, dict) and "spots" in fit
     }
 
 

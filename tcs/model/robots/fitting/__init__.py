@@ -11,12 +11,13 @@ from tcs.model.robots.fitting.bodies import BodyFit, fit_robot, refit, refit_par
 from tcs.model.robots.fitting.covering import Target
 from tcs.model.robots.fitting.enclosure import BodyEnclosure, enclosure
 from tcs.model.robots.fitting.parts import Part
-from tcs.model.robots.fitting.tightening import tightened
+from tcs.model.robots.fitting.tightening import Spots, tightened
 
 __all__ = [
     "BodyEnclosure",
     "BodyFit",
     "Part",
+    "Spots",
     "Target",
     "enclosure",
     "fit_robot",

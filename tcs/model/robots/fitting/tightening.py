@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +55,8 @@ _WORTH = 0.002
 _NEW = 20
 """Weight of volume outside that was free of shapes before: pairs of bodies that were found never to
 touch should not do so now."""
+_SPOT = 20.0
+"""Weight of volume outside in a spot."""
 _NEAR = 0.15
 """Border around points in which a box around them is rotated, as a fraction of their extent."""
 _INSIDE = 1e-3
@@ -61,8 +64,15 @@ _INSIDE = 1e-3
 smaller is taken."""
 
 
+Spots = Sequence[tuple[float, float, float, float]]
+"""Balls near the surface of a body: centre in its frame and radius [m]."""
+
+
 def tightened(
-    robot: RobotFile, shapes: Iterable[Primitive], splits: Mapping[str, int]
+    robot: RobotFile,
+    shapes: Iterable[Primitive],
+    splits: Mapping[str, int],
+    spots: Mapping[str, Spots] = MappingProxyType({}),
 ) -> tuple[Primitive, ...]:
     """Return primitives that enclose a robot, those of some bodies made tighter.
 
@@ -74,6 +84,7 @@ def tightened(
         robot: The robot.
         shapes: Primitives that enclose it.
         splits: Largest number of shapes that are added, by body.
+        spots: Where others pass a body closely: there its shapes become the closest.
 
     Raises:
         UnknownNameError: If a body has no primitive.
@@ -87,7 +98,7 @@ def tightened(
         if body not in found or body not in surfaces:
             raise UnknownNameError("body", body, found, where=f"primitives '{robot.primitives}'")
         triangles = surfaces[body][2]
-        tightening = Tightening(body, found[body], triangles)
+        tightening = Tightening(body, found[body], triangles, spots.get(body, ()))
         tightening.reduce()
         tightening.split(most)
         # What shapes leave each other has changed.
@@ -100,19 +111,27 @@ def tightened(
 class Tightening:
     """Shapes that contain a surface together, each reduced to what the others leave."""
 
-    def __init__(self, body: str, shapes: Iterable[Primitive], triangles: FloatArray) -> None:
+    def __init__(
+        self,
+        body: str,
+        shapes: Iterable[Primitive],
+        triangles: FloatArray,
+        spots: Spots = (),
+    ) -> None:
         """Cut the surface into pieces that each lie in a shape.
 
         Args:
             body: Name of the body.
             shapes: Shapes that enclose the triangles.
             triangles: Corners in the frame of the body [m], shape (n, 3, 3).
+            spots: Where volume outside counts most.
         """
         self._body, self._shapes = body, list(shapes)
         volume = float(np.ptp(triangles, axis=(0, 1)).prod())
         pitch = max(FINEST_PITCH, float(np.cbrt(volume / CELLS)))
         reach = _overhang(self._shapes, triangles)
         self._solid, inside = _measured(triangles, pitch, reach)
+        self._worth = _worth(self._solid, spots)
         self._pieces = _pieces_in(self._shapes, triangles, max(PIECE, 2 * pitch))
         points, index = np.unique(self._pieces.reshape(-1, 3), axis=0, return_inverse=True)
         self._corners, self._index = points, index.reshape(-1, 3)
@@ -134,6 +153,10 @@ class Tightening:
     def excess(self) -> float:
         """Volume of all shapes together that is outside the body [m^3]."""
         return float(np.count_nonzero(self._held)) * self._solid.pitch**3
+
+    def _volume(self, cells: IntArray) -> float:
+        """Return the volume of cells, with that in spots as often as it counts [m^3]."""
+        return float(self._worth[cells].sum(dtype=np.float64)) * self._solid.pitch**3
 
     def reduce(self) -> None:
         """Reduce each shape to what it alone contains, those that protrude most first."""
@@ -157,7 +180,7 @@ class Tightening:
             most: Largest number of shapes that are added.
         """
         whole, end = set[int](), len(self._shapes) + most
-        least = _WORTH * self.excess
+        least = _WORTH * self._volume(np.flatnonzero(self._held))
         while len(self._shapes) < end:
             costs = {k: self._own(c) for k, c in enumerate(self._cells) if k not in whole}
             k = max(costs, key=costs.__getitem__, default=-1)
@@ -273,8 +296,7 @@ class Tightening:
 
     def _own(self, cells: IntArray) -> float:
         """Return the volume of the cells that one shape alone contains [m^3]."""
-        alone = cells[self._held[cells] == 1]
-        return len(alone) * self._solid.pitch**3
+        return self._volume(cells[self._held[cells] == 1])
 
     def _added(self, cells: IntArray) -> float:
         """Return the volume of the cells that no shape contains [m^3].
@@ -282,8 +304,7 @@ class Tightening:
         Those that no shape contained at first count as many times as is needed to avoid them.
         """
         bare = cells[self._held[cells] == 0]
-        counts = np.where(self._allowed[bare], 1.0, 1.0 + _NEW)
-        return float(counts.sum()) * self._solid.pitch**3
+        return self._volume(bare) + _NEW * self._volume(bare[~self._allowed[bare]])
 
     def _contained(self, shape: Primitive) -> BoolArray:
         return np.concatenate([contained(shape, self._pieces), shape.contains(self._inside)])
@@ -316,6 +337,17 @@ def _measured(triangles: FloatArray, pitch: float, reach: float) -> tuple[Solid,
     outside[tuple(cells.T)] = 0.0
     inside = wide.points(wide.depth > max(DEEP, 4 * pitch))
     return replace(solid, outside=outside), thinned(inside, max(DEEP, extent / SPACINGS))
+
+
+def _worth(solid: Solid, spots: Spots) -> NDArray[np.float32]:
+    """Return how many times the cells of a grid count, shape (n,)."""
+    worth = np.ones(solid.outside.shape, np.float32)
+    for *centre, radius in spots:
+        around, first = solid.between(np.array(centre) - radius, np.array(centre) + radius)
+        cells = np.argwhere(np.ones(worth[around].shape, np.bool_)) + first
+        near = np.linalg.norm(cells * solid.pitch + solid.origin - centre, axis=1) <= radius
+        worth[tuple(cells[near].T)] = _SPOT
+    return worth.ravel()
 
 
 def _overhang(shapes: list[Primitive], triangles: FloatArray) -> float:

@@ -96,6 +96,21 @@ def test_rotated_boxes_protrude_less(steps, monkeypatch):
     assert excess[0] < 0.93 * excess[1]
 
 
+def test_splits_go_where_spots_are(steps):
+    """A box around two drums, both as far from it: the volume beside that in a spot goes first."""
+    box = enclose("b", corner_points(steps), "box", np.eye(3))
+    spot = (0.07, 0.07, 0.0, 0.04)
+    inside = np.random.default_rng(0).uniform(-0.04, 0.04, (9999, 3)) + spot[:3]
+    inside = inside[np.linalg.norm(inside[:, :2], axis=1) > 0.1]
+    held = []
+    for spots in ((), [spot]):
+        tightening = Tightening("b", (box,), steps, spots)
+        tightening.split(3)
+        assert enclosed(tightening.shapes, steps).all()
+        held.append(np.any([s.contains(inside) for s in tightening.shapes], axis=0).mean())
+    assert held[1] < 0.85 * held[0]
+
+
 def test_inside_behind_an_opening_stays_covered():
     """A can without a part of its lid: a ball of 5 mm enters, one of 15 mm does not."""
     can = np.asarray(trimesh.creation.box((0.1, 0.1, 0.1)).subdivide().subdivide().triangles)
