@@ -118,7 +118,7 @@ def main() -> None:
             crossing += exempt(line, bodies, options.exempt, options.seed)
     record("pairs", ["robot", "contact of shapes alone", "postures [%]"], blocking)
     record("exempt", ["robot", "exempt pair whose meshes cross", "postures [%]"], crossing)
-    save(options)
+    save(options, keep=True)
 
 
 def blocked(line: str, bodies: Bodies, postures: int, seed: int) -> list[list[str]]:
