@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: one line, a clean end, and an exit code.
+"""Ctrl-C, SIGTERM and a closed terminal: one line, a clean end, and an exit code.
 
 This module is imported before everything else, so that an interrupt finds its handler however early
 it comes. It imports nothing large.
@@ -12,10 +12,13 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 
 _ENDINGS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
+if hasattr(signal, "SIGHUP"):
+    # The terminal was closed; under `nohup` the signal is ignored, and stays so.
+    _ENDINGS[signal.SIGHUP] = "hung up"
 _received: list[int] = []
 """The signals received: compiled libraries may drop the exception, or replace it by another one."""
 _reported: list[int] = []
@@ -28,7 +31,7 @@ _LOADER = ("create_module", "<frozen importlib._bootstrap_external>")
 
 @contextmanager
 def remember_interrupts(*, to_the_end: bool = False) -> Iterator[None]:
-    """Record Ctrl-C and SIGTERM, in addition to raising `KeyboardInterrupt`.
+    """Record Ctrl-C, SIGTERM and SIGHUP, in addition to raising `KeyboardInterrupt`.
 
     Inside another `remember_interrupts`, and on other than the main thread, it does nothing.
 
@@ -98,20 +101,23 @@ def _exit_as_reported() -> None:
 
 
 def was_interrupted() -> bool:
-    """Return whether Ctrl-C or SIGTERM came inside `remember_interrupts`."""
+    """Return whether one of the signals came inside `remember_interrupts`."""
     return bool(_received)
 
 
 def raise_if_interrupted() -> None:
-    """Raise the `KeyboardInterrupt` of an earlier Ctrl-C or SIGTERM that compiled code dropped."""
+    """Raise the `KeyboardInterrupt` of an earlier signal that compiled code dropped."""
     if _received:
         raise KeyboardInterrupt
 
 
 def report_interrupt() -> int:
-    """Print in one line that the work was interrupted; return the exit code, 130 or 143."""
+    """Print in one line that the work was interrupted; return the exit code: 130, 143 or 129."""
     number = _received[0] if _received else signal.SIGINT
-    sys.stderr.write(f"tcs: {_ENDINGS[signal.Signals(number)]}; no half-written file is left.\n")
-    sys.stderr.flush()
+    line = f"tcs: {_ENDINGS[signal.Signals(number)]}; no half-written file is left.\n"
+    # A closed terminal takes no line.
+    with suppress(OSError):
+        sys.stderr.write(line)
+        sys.stderr.flush()
     _reported[:] = [128 + number]
     return 128 + number

@@ -81,8 +81,9 @@ SIGNALS = pytest.mark.parametrize(
     [
         (signal.SIGINT, 130, "tcs: interrupted; no half-written file is left.\n"),
         (signal.SIGTERM, 143, "tcs: terminated; no half-written file is left.\n"),
+        (signal.SIGHUP, 129, "tcs: hung up; no half-written file is left.\n"),
     ],
-    ids=["ctrl-c", "terminated"],
+    ids=["ctrl-c", "terminated", "hung-up"],
 )
 
 
