@@ -32,8 +32,12 @@ def refine(
     ] = 6,
     rounds: Annotated[int, typer.Option(help="Greatest number of rounds of the search.")] = 40,
     samples: Annotated[
-        int, typer.Option(help="Number of samples of the success, for the objectives with one.")
-    ] = 64,
+        int | None,
+        typer.Option(
+            help="Number of samples of the success, for the objectives with one.",
+            show_default="64; of success and margin 2000",
+        ),
+    ] = None,
     keep_success: Annotated[
         bool,
         typer.Option(

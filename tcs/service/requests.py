@@ -227,7 +227,7 @@ class RefineRequest(Observed):
     objective: Text = "score"
     starts: Annotated[int, Field(strict=True, ge=1, le=100)] = 6
     rounds: Annotated[int, Field(strict=True, ge=1, le=1000)] = 40
-    samples: Annotated[int, Field(strict=True, ge=1, le=10_000)] = 64
+    samples: Annotated[int, Field(strict=True, ge=1, le=10_000)] | None = None
     keep_success: Annotated[bool, Field(strict=True)] = True
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
 

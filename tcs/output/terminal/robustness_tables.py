@@ -84,6 +84,16 @@ def report_robustified(result: Mapping[str, Any]) -> None:
                 f"{best['sets']:,}",
                 "; ".join(member_text(member) for member in best["members"]),
             )
+        if (refined := row["refined"]) is not None:
+            low, high = refined["ci95"]
+            table.add_row(
+                state,
+                "refined",
+                f"{refined['success']:.1%}",
+                f"{low:.1%} to {high:.1%}",
+                f"{refined['sets']:,}",
+                "; ".join(member_text(member) for member in refined["members"]),
+            )
     out.print(table)
     out.print(f"wrote {result['file']}. To select by success, with the current base X Y YAW_DEG:")
     typer.echo(f"tcs select {shlex.quote(result['file'])} --here X Y YAW_DEG --delta 1")

@@ -7,18 +7,16 @@ what any set could reach.
 from __future__ import annotations
 
 from tcs.placement.refinement.evaluation import evaluate_refined
+from tcs.placement.refinement.made_table import refinement_summary
 from tcs.placement.refinement.members import (
     RefinedMembers,
     refined_table,
     score_members,
 )
 from tcs.placement.refinement.place import Placement, place
-from tcs.placement.refinement.points import Points, PointScorer, PointScores
-from tcs.placement.refinement.refined_file import (
-    OBJECTIVES,
-    refine,
-    refinement_summary,
-)
+from tcs.placement.refinement.points import PointScorer, PointScores
+from tcs.placement.refinement.refined_file import OBJECTIVES, refine
+from tcs.placement.tables import Points
 
 __all__ = [
     "OBJECTIVES",

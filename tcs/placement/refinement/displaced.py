@@ -8,10 +8,12 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.model.grid import ROBOT_AXES
-from tcs.placement.refinement.points import Points, PointScorer
+from tcs.placement.refinement.points import PointScorer
+from tcs.placement.tables import Points
 
 RADIUS = 0.05
 """Greatest displacement of the base on the floor [m]."""
@@ -70,8 +72,16 @@ class DisplacedBases:
 
     def hardest(self, count: int) -> Self:
         """Return the samples with the largest displacements."""
+        return self.only(np.sort(self.order[:count]))
+
+    @property
+    def order(self) -> NDArray[np.intp]:
+        """Numbers of the samples, the largest displacements first, shape (samples,)."""
         size = np.sum((self.offsets / [RADIUS, RADIUS, ANGLE]) ** 2, axis=1)
-        rows = np.sort(np.argsort(-size, kind="stable")[:count])
+        return np.argsort(-size, kind="stable")
+
+    def only(self, rows: NDArray[np.intp]) -> Self:
+        """Return some of the samples."""
         return dataclasses.replace(self, offsets=self.offsets[rows])
 
     def reached(self, points: Points) -> BoolArray:

@@ -10,12 +10,11 @@ import numpy as np
 from tcs.errors import SelectionError
 from tcs.model.random_streams import check_draws
 from tcs.placement.refinement.members import refined_table
-from tcs.placement.refinement.perturbed import PerturbedPoints
-from tcs.placement.refinement.points import Points
-from tcs.placement.robustness import Evaluation, Trials
+from tcs.placement.robustness import Evaluation, PerturbedPoints, Trials
 from tcs.placement.robustness.displacements import displaced
 from tcs.placement.robustness.trials import Errors
 from tcs.placement.store import ScoreFile, state_to_json
+from tcs.placement.tables import Points
 
 
 def evaluate_refined(

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.placement.refinement.objectives import Samples
-from tcs.placement.refinement.points import Points
 from tcs.placement.refinement.search import Walk
-from tcs.placement.tables import tc_reachability
+from tcs.placement.tables import Points, tc_reachability
 
 HARDEST = 8
 """One in so many samples screens sets during the search: those with the largest errors."""
@@ -83,9 +83,18 @@ class RememberedSamples:
         """Number of samples."""
         return self.of.samples
 
+    @property
+    def order(self) -> NDArray[np.intp]:
+        """Numbers of the samples, the largest changes first, shape (samples,)."""
+        return self.of.order
+
     def hardest(self, count: int) -> Self:
         """Return the samples with the largest changes."""
         return type(self)(self.of.hardest(count))
+
+    def only(self, rows: NDArray[np.intp]) -> Self:
+        """Return some of the samples."""
+        return type(self)(self.of.only(rows))
 
     def reached(self, points: Points) -> BoolArray:
         """Return which goals each configuration reaches in each sample, shape (n, samples, G)."""

@@ -8,9 +8,9 @@ import numpy as np
 
 from tcs.errors import SelectionError
 from tcs.model.grid import InitialConfiguration
-from tcs.placement.refinement.points import Points, PointScorer
+from tcs.placement.refinement.points import PointScorer
 from tcs.placement.store import ScoreFile
-from tcs.placement.tables import RefinedSet, RefinedTable, ScoreTable
+from tcs.placement.tables import Points, RefinedSet, RefinedTable, ScoreTable
 
 
 class RefinedMembers(NamedTuple):

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.placement.refinement.displaced import DisplacedBases
-from tcs.placement.refinement.points import Points, PointScores
+from tcs.placement.refinement.points import PointScores
+from tcs.placement.tables import Points
 
 TIE = 1e-3
 """Weight of P_R + P_M beside the success: decides among sets of equal success, and is less than
@@ -82,46 +83,18 @@ class Samples(Protocol):
     def samples(self) -> int:
         """Number of samples."""
 
+    @property
+    def order(self) -> NDArray[np.intp]:
+        """Numbers of the samples, the largest changes first, shape (samples,)."""
+
     def hardest(self, count: int) -> Self:
         """Return the samples with the largest changes."""
 
+    def only(self, rows: NDArray[np.intp]) -> Self:
+        """Return some of the samples."""
+
     def reached(self, points: Points) -> BoolArray:
         """Return which goals each configuration reaches in each sample, shape (n, samples, G)."""
-
-
-@dataclass(frozen=True, eq=False)
-class SuccessObjective:
-    """Success, the mean of P_R over samples that are the same for all configurations.
-
-    Each goal in each sample is a feature, and each goal without error, with a weight of TIE.
-    """
-
-    weights: FloatArray
-    """Weights of the goals, sum 1, shape (G,)."""
-    perturbed: Samples
-    """The samples."""
-
-    def features(self, points: Points, scores: PointScores) -> Features:
-        """Return the goals that configurations reach in each sample, and without error."""
-        count = len(points.values)
-        # A configuration whose body is in contact, or that reaches nothing, is no choice.
-        rows = np.flatnonzero(scores.reached.any(axis=1))
-        under_error = np.zeros((count, self.perturbed.samples, self.weights.size), dtype=np.bool_)
-        under_error[rows] = self.perturbed.reached(Points(points.values[rows], points.arm[rows]))
-        flat = under_error.reshape(count, -1)
-        dexterity = np.zeros(flat.shape, dtype=np.float32)
-        return Features(
-            np.concatenate([flat, scores.reached], axis=1),
-            np.concatenate([dexterity, scores.dexterity], axis=1),
-        )
-
-    def values(self, features: Features) -> FloatArray:
-        """Return the success of sets, with P_R + P_M among equals."""
-        goals, samples = self.weights.size, self.perturbed.samples
-        weights = np.tile(self.weights / samples, samples)
-        under_error = features.reached[..., :-goals].any(axis=1) @ weights
-        nominal = features.reached[..., -goals:], features.dexterity[..., -goals:]
-        return np.asarray(under_error + TIE * _score(*nominal, self.weights))
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,10 +22,10 @@ from tcs.model.robots import RobotFile, load_robot
 from tcs.placement.constraints import Obstacle
 from tcs.placement.refinement.joint_path import joint_path
 from tcs.placement.refinement.objectives import ScoreObjective
-from tcs.placement.refinement.points import Points
 from tcs.placement.refinement.poses import PoseScene, PoseScorer
 from tcs.placement.refinement.search import LocalSearch
 from tcs.placement.refinement.space import Space
+from tcs.placement.tables import Points
 
 FloorRange = tuple[tuple[float, float], tuple[float, float]]
 """Least and greatest x, and y, of the base [m]."""

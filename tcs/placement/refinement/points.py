@@ -22,19 +22,10 @@ from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.rebuild import rebuild_scene
 from tcs.placement.scoring.sweep import name_contacts, warm_up
 from tcs.placement.store import ScoreFile, files_of_arms
-from tcs.placement.tables import Reason, ScoreTable
+from tcs.placement.tables import Points, Reason, ScoreTable
 
 BATCH = 32
 """Configurations that a thread scores at a time: some milliseconds of work."""
-
-
-class Points(NamedTuple):
-    """Configurations by the values of the grid's axes."""
-
-    values: FloatArray
-    """Values in the order of the axes [m or rad], shape (n, axes)."""
-    arm: IntArray
-    """Number of the arm that each uses, 0 in a file of one arm, shape (n,)."""
 
 
 class PointScores(NamedTuple):
@@ -110,6 +101,11 @@ class PointScorer:
         for arm in self.arms:
             problem = build_problem(arm.lowered.arrays, arm.lowered.grid, self.measure)
             warm_up(problem, on_compile)
+
+    @property
+    def built(self) -> list[tuple[Job, Scene, LoweredScene]]:
+        """The robot with each arm, for trials."""
+        return [(arm.job, arm.scene, arm.lowered) for arm in self.arms]
 
     @property
     def goals(self) -> int:

@@ -17,10 +17,10 @@ from tcs.model.grid import Grid
 from tcs.model.robots import RobotFile
 from tcs.model.scene import EMPTY_ENVIRONMENT, Scene, SceneSpec, lower
 from tcs.placement.constraints import Obstacle
-from tcs.placement.refinement.points import Points, PointScores
+from tcs.placement.refinement.points import PointScores
 from tcs.placement.scoring.obstacles import with_obstacles
 from tcs.placement.scoring.sweep import warm_up
-from tcs.placement.tables import Reason
+from tcs.placement.tables import Points, Reason
 
 BATCH = 64
 """Base poses that a thread scores at a time."""

@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from importlib.metadata import version
-from typing import Any
 
 import numpy as np
 
@@ -24,25 +23,25 @@ from tcs.placement.refinement.floor import (
     settled,
     successes,
 )
+from tcs.placement.refinement.made_table import as_table, with_estimates, with_refined
 from tcs.placement.refinement.objectives import (
     BallObjective,
     Features,
     Objective,
     Samples,
     ScoreObjective,
-    SuccessObjective,
     TocObjective,
 )
-from tcs.placement.refinement.perturbed import PerturbedPoints
-from tcs.placement.refinement.points import Points, PointScorer
+from tcs.placement.refinement.points import PointScorer
 from tcs.placement.refinement.search import LocalSearch, Walk, without_idle_members
 from tcs.placement.refinement.space import Space
-from tcs.placement.robustness import Trials
+from tcs.placement.refinement.staged import StagedSamples
+from tcs.placement.refinement.surest import SurestSearch, surest_pairs
+from tcs.placement.robustness import PerturbedPoints, Trials
 from tcs.placement.selection import Top, UtilityWeights, select
 from tcs.placement.selection.choice import SelectionTables
 from tcs.placement.store import ScoreFile
-from tcs.placement.tables import RefinedTable, SetTable, tc_reachability
-from tcs.placement.tables.success import NO_MEMBER
+from tcs.placement.tables import Points, SetTable, tc_reachability
 
 OBJECTIVES = ("score", "success", "margin", "ball", "toc")
 """What a refinement maximises: P_R + P_M, the success under the errors of the environment, the
@@ -52,8 +51,6 @@ BY_SUCCESS = ("success", "margin")
 """Objectives that are the success in samples."""
 WITHOUT_SAMPLES = ("score", "toc")
 """Objectives that depend on the scores alone."""
-KEY = "refinement"
-"""Entry of the metadata: for each table, None or the settings and figures of its refinement."""
 MOST_STARTS = 50
 """Greatest number of sets to start from."""
 MOST_ROUNDS = 1000
@@ -66,8 +63,12 @@ STREAM = "refinement"
 """Name of the random stream of the search."""
 SAMPLES_STREAM = "refinement samples"
 """Name of the random stream of the samples of the success."""
+SAMPLES = 64
+"""Samples of the success that a set must keep, and displacements of the ball."""
+SURE_SAMPLES = 2000
+"""Samples of an objective that is a success: fewer are soon satisfied by sets next to a loss."""
 FRESH_SAMPLES = 500
-"""Samples on which the refined set is judged."""
+"""Samples on which the refined set is judged; as many as the objective has if those are more."""
 CHECK_STREAM = "refinement check"
 """Name of their random stream."""
 CHOICE_STREAM = "refinement choice"
@@ -81,7 +82,7 @@ def refine(
     objective: str = "score",
     starts: int = 6,
     rounds: int = 40,
-    samples: int = 64,
+    samples: int | None = None,
     keep_success: bool = True,
     seed: int = 0,
     table: int | None = None,
@@ -105,7 +106,8 @@ def refine(
             times 0.95 for a set of two or more. The samples are the same for all configurations.
         starts: Number of sets to start from; up to three single configurations come on top.
         rounds: Greatest number of rounds of the search.
-        samples: Number of samples of the success.
+        samples: Number of samples of the success; by default 2,000 for the objectives that are a
+            success, 64 for the others.
         keep_success: Whether, with the objective "score", a set must be at least as sure under
             the errors of the environment (of the base, if it has none) as the best set of the
             grid, in the hardest of the samples and in others that judge the result.
@@ -126,6 +128,9 @@ def refine(
             scored with approach.
         TcsError: If a number is out of range.
     """
+    by_success = objective in BY_SUCCESS
+    if samples is None:
+        samples = SURE_SAMPLES if by_success else SAMPLES
     check_draws(samples, seed)
     if objective not in OBJECTIVES:
         raise UnknownNameError("objective", objective, OBJECTIVES, where="refine")
@@ -147,34 +152,38 @@ def refine(
     drawn = draw(samples, SAMPLES_STREAM)
     # Rails run along x of the mount; beside them there is nothing to bolt a robot to.
     rails = ("base_y",) if file.environment.get("mount") else ()
-    search = LocalSearch(
-        scorer,
-        Space.of(file.configurations, sets, fixed=rails),
-        _objective(objective, sets, drawn),
-        named_generator(seed, STREAM),
-    )
-    starts_at = starting_sets(file, number, starts)
+    space = Space.of(file.configurations, sets, fixed=rails)
+    rng = named_generator(seed, STREAM)
+    if by_success:
+        staged = StagedSamples.of(drawn, sets.weights)
+        search: LocalSearch = SurestSearch.of(scorer, space, staged, rng)
+        pairs = surest_pairs(staged, search, sets, starts, APART)
+        starts_at = list(dict.fromkeys([*starting_sets(file, number, 1), *pairs]))
+    else:
+        search = LocalSearch(scorer, space, _objective(objective, sets, drawn), rng)
+        starts_at = starting_sets(file, number, starts)
     keep = objective == "score" and keep_success
     if keep:
         hardest = _floor(search, drawn.hardest(-(-samples // HARDEST)), sets)
         search = dataclasses.replace(search, keeps=hardest.keeps)
     walks, scored = search.run(starts_at, rounds, on_progress or (lambda done, total: None))
-    judging = draw(FRESH_SAMPLES, CHECK_STREAM)
+    judges = max(FRESH_SAMPLES, samples) if by_success else FRESH_SAMPLES
+    judging = draw(judges, CHECK_STREAM)
     fresh = RememberedSamples(judging)
     needed = None
     if keep:
         screen, judge = (
-            _floor(search, of, sets) for of in (fresh.hardest(FRESH_SAMPLES // HARDEST), fresh)
+            _floor(search, of, sets) for of in (fresh.hardest(judges // HARDEST), fresh)
         )
         walks = settled(walks, screen, judge)
         needed = judge.keeps_of_sets
-    elif objective in BY_SUCCESS:
-        choosing = RememberedSamples(draw(FRESH_SAMPLES, CHOICE_STREAM))
+    elif by_success:
+        choosing = RememberedSamples(draw(judges, CHOICE_STREAM))
         walks = at_surest(walks, choosing, sets.weights)
         needed = partial(_as_sure_as, walks[0].present.points, choosing, sets)
     first = without_idle_members(walks[0], search.objective, needed)
     walks = [first, *walks[1:]]
-    refined = _as_table(walks, sets.weights)
+    refined = with_estimates(file, number, scorer, as_table(walks, sets.weights))
     success = None if is_scored and not keep else _success(search, walks[0], fresh, sets)
     ball = _ball(search, walks[0], judging, sets) if objective == "ball" else None
     settings = {
@@ -192,7 +201,7 @@ def refine(
         "bound": upper_bound(file, number, scorer),
         "seconds": time.perf_counter() - begun,
     }
-    return _with_refined(file, number, refined, settings)
+    return with_refined(file, number, refined, settings)
 
 
 def starting_sets(file: ScoreFile, table: int, count: int) -> list[tuple[int, ...]]:
@@ -225,42 +234,6 @@ def starting_sets(file: ScoreFile, table: int, count: int) -> list[tuple[int, ..
     return [start for start in dict.fromkeys(found) if start]
 
 
-def refinement_summary(file: ScoreFile, table: int | None = None) -> dict[str, Any]:
-    """Return what a refinement gained, as printed by `tcs refine --json`.
-
-    Args:
-        file: A score file with refined sets.
-        table: Number of the refined table; by default the nominal one.
-
-    Raises:
-        SelectionError: If the table was not refined.
-    """
-    number = file.nominal_index if table is None else table
-    scored = file.tables[number]
-    settings = file.metadata.get(KEY, [None] * len(file.tables))[number]
-    if scored.refined is None or settings is None:
-        raise SelectionError("No sets of this table were refined. Refine them: tcs refine FILE.")
-    reachability, manipulability = scored.sets.scores_of(scored.sets.best)
-    refined = scored.refined
-    total = float(refined.reachability[0] + refined.manipulability[0])
-    return {
-        "measure": file.metadata["measure"],
-        **settings,
-        "before": {
-            "reachability": round(reachability, 12),
-            "manipulability": round(manipulability, 12),
-            "members": [file.configurations.configuration(h).to_json() for h in scored.sets.best],
-        },
-        "after": {
-            "reachability": round(float(refined.reachability[0]), 12),
-            "manipulability": round(float(refined.manipulability[0]), 12),
-            "members": [member.to_json() for member in refined.members(file.configurations, 0)],
-        },
-        "gap": settings["bound"] / total - 1.0,
-        "sets": len(refined.origin),
-    }
-
-
 def _samples(
     file: ScoreFile, table: int, scorer: PointScorer, objective: str, seed: int
 ) -> Callable[[int, str], Samples]:
@@ -269,8 +242,7 @@ def _samples(
     They are errors of the environment; displacements of the base for the objectives "margin" and
     "ball", and where no joint of the environment has an error.
     """
-    built = [(arm.job, arm.scene, arm.lowered) for arm in scorer.arms]
-    trials = Trials.built(file, table, built)
+    trials = Trials.built(file, table, scorer.built)
 
     def drawn(samples: int, stream: str) -> Samples:
         if objective == "ball":
@@ -291,7 +263,7 @@ def _objective(name: str, sets: SetTable, drawn: Samples) -> Objective:
         return TocObjective(sets.weights)
     if name == "ball" and isinstance(drawn, DisplacedBases):
         return BallObjective(sets.weights, drawn)
-    return SuccessObjective(sets.weights, drawn)
+    raise UnknownNameError("objective", name, OBJECTIVES, where="refine")
 
 
 def _floor(search: LocalSearch, samples: Samples, sets: SetTable) -> SuccessFloor:
@@ -332,36 +304,3 @@ def _ball(
         of_set = Features(features.reached[None], features.dexterity[None])
         radii.append(float(judge.radius(of_set)[0]))
     return {"before": radii[0], "after": radii[1], "samples": fresh.samples}
-
-
-def _as_table(walks: Sequence[Walk], weights: np.ndarray[Any, Any]) -> RefinedTable:
-    """Return refined sets as one table, in their order."""
-    width = max(walk.members for walk in walks)
-
-    def filled(arrays: Sequence[np.ndarray[Any, Any]], fill: float) -> np.ndarray[Any, Any]:
-        first = arrays[0]
-        out = np.full((len(arrays), width, *first.shape[1:]), fill, dtype=first.dtype)
-        for row, array in zip(out, arrays, strict=True):
-            row[: len(array)] = array
-        return out
-
-    return RefinedTable(
-        origin=filled([np.array(walk.origin, dtype=np.int32) for walk in walks], NO_MEMBER),
-        values=filled([walk.present.values for walk in walks], 0.0),
-        reached=filled([walk.present.reached for walk in walks], False),
-        dexterity=filled([walk.present.dexterity for walk in walks], 0.0),
-        arm_joints=filled([walk.present.joints for walk in walks], 0.0),
-        objective=np.array([walk.value for walk in walks]),
-        weights=weights,
-    )
-
-
-def _with_refined(
-    file: ScoreFile, table: int, refined: RefinedTable, settings: dict[str, Any]
-) -> ScoreFile:
-    """Return the file with the refined sets of one table."""
-    tables = list(file.tables)
-    tables[table] = dataclasses.replace(tables[table], refined=refined)
-    records = list(file.metadata.get(KEY, [None] * len(tables)))
-    records[table] = settings
-    return dataclasses.replace(file, metadata={**file.metadata, KEY: records}, tables=tuple(tables))

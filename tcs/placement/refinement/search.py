@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from tcs.kernel.arrays import BoolArray
 from tcs.model.grid import Grid
 from tcs.placement.refinement.objectives import Features, Objective
-from tcs.placement.refinement.points import Points, PointScores
+from tcs.placement.refinement.points import PointScores
 from tcs.placement.refinement.space import Space
+from tcs.placement.tables import Points
 
 POINTS_PER_AXIS = 8
 """Random configurations per axis around each member in a round."""
@@ -126,6 +127,8 @@ class LocalSearch:
     rng: np.random.Generator
     keeps: Condition | None = None
     """Condition of the sets that walks move to, checked for few of them; None for none."""
+    screening_rounds: int = SCREENING_ROUNDS
+    """Rounds after which only the best sets are refined further."""
 
     def run(
         self,
@@ -143,7 +146,7 @@ class LocalSearch:
         walks = self._started(starts)
         active, scored = walks, sum(walk.members for walk in walks)
         for number in range(rounds):
-            if number == SCREENING_ROUNDS:
+            if number == self.screening_rounds:
                 active = _best_of(walks)
             active = [walk for walk in active if walk.width >= FINEST]
             if not active:

@@ -14,10 +14,16 @@ from tcs.placement.robustness.comparison import (
     method_name,
 )
 from tcs.placement.robustness.error_model import ErrorFile, ErrorModel
-from tcs.placement.robustness.estimation import robustify, success_of, success_summary
+from tcs.placement.robustness.estimation import (
+    robustify,
+    success_of,
+    success_summary,
+    with_success,
+)
 from tcs.placement.robustness.evaluation import SELECTIONS, Evaluation, evaluate
 from tcs.placement.robustness.gains import Gain, Prediction, predictions, robust_gains
 from tcs.placement.robustness.losses import Loss, Losses, losses
+from tcs.placement.robustness.perturbed_points import PerturbedPoints
 from tcs.placement.robustness.statistics import Difference, Mean, mean_of, rank_sum, signed_rank
 from tcs.placement.robustness.study import RowStudy, StudyPlan, check_row, study_row, study_rows
 from tcs.placement.robustness.trials import Trials
@@ -35,6 +41,7 @@ __all__ = [
     "Losses",
     "Mean",
     "MethodComparison",
+    "PerturbedPoints",
     "Prediction",
     "RowStudy",
     "StudyPlan",
@@ -54,4 +61,5 @@ __all__ = [
     "study_rows",
     "success_of",
     "success_summary",
+    "with_success",
 ]

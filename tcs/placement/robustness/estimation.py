@@ -15,10 +15,19 @@ from tcs.files.blocks import BlockFolder
 from tcs.model.grid import Grid
 from tcs.model.random_streams import check_draws
 from tcs.placement.robustness.pairs import EQUAL_REACHABILITY, Pairs, kept_pairs
+from tcs.placement.robustness.perturbed_points import PerturbedPoints
+from tcs.placement.robustness.statistics import intervals_of
 from tcs.placement.robustness.successive_halving import Estimates, round_sizes, successive_halving
 from tcs.placement.robustness.trials import Errors, Progress, Trials
 from tcs.placement.store import ScoreFile, state_to_json
-from tcs.placement.tables import SetTable, SuccessTable, tc_reachability
+from tcs.placement.tables import (
+    Points,
+    RefinedSuccess,
+    RefinedTable,
+    SetTable,
+    SuccessTable,
+    tc_reachability,
+)
 from tcs.placement.tables.rules import FRACTION_TOLERANCE
 from tcs.placement.tables.success import NO_MEMBER
 
@@ -99,7 +108,10 @@ def robustify(
         for number in chosen:
             here = kept.at_table(number)
             success = success_of(here, sets=sets, samples=samples, seed=seed, jobs=jobs, step=step)
-            scored[number] = dataclasses.replace(here.scored, success=success)
+            refined = here.scored.refined
+            if refined is not None:
+                refined = with_success(here, refined, samples=samples, seed=seed, jobs=jobs)
+            scored[number] = dataclasses.replace(here.scored, success=success, refined=refined)
     settings = {
         "program_version": version("tcs"),
         "samples": samples,
@@ -142,8 +154,31 @@ def success_summary(file: ScoreFile) -> dict[str, Any]:
                 }
             )
         observed = state_to_json(file.observed_axes, state)
-        tables.append({"observed": observed, "best": best, "settings": settings})
+        tables.append(
+            {
+                "observed": observed,
+                "best": best,
+                "refined": _surest_refined(grid, scored.refined),
+                "settings": settings,
+            }
+        )
     return {"tables": tables}
+
+
+def _surest_refined(grid: Grid, refined: RefinedTable | None) -> dict[str, Any] | None:
+    """Return the refined set with the greatest lower bound of its success; None without one."""
+    if refined is None or refined.success is None:
+        return None
+    success = refined.success
+    row = int(np.argmax(success.low))
+    return {
+        "row": row,
+        "members": [member.to_json() for member in refined.members(grid, row)],
+        "success": float(success.mean[row]),
+        "ci95": [float(success.low[row]), float(success.high[row])],
+        "samples": success.samples,
+        "sets": len(refined.origin),
+    }
 
 
 def success_of(
@@ -180,6 +215,32 @@ def success_of(
             (contenders, successive_halving(contenders, table.weights, samples, attempt, step))
         )
     return _as_table(table, found)
+
+
+def with_success(
+    trials: Trials, refined: RefinedTable, *, samples: int, seed: int, jobs: int = 2
+) -> RefinedTable:
+    """Return refined sets with their success in the samples that the surest sets of the grid get.
+
+    Args:
+        trials: Trials of the table that they were refined from.
+        refined: The sets.
+        samples: Number of samples.
+        seed: Seed of the samples.
+        jobs: Number of threads.
+    """
+    offsets = trials.errors.draw(samples, seed, stream=ESTIMATION_STREAM)
+    rows, columns = np.nonzero(refined.origin != NO_MEMBER)
+    arm = refined.origin[rows, columns].astype(np.int64) // trials.grid.arm_size
+    points = Points(refined.values[rows, columns], arm)
+    found = PerturbedPoints(trials, offsets, jobs).reached(points)
+    fractions = [
+        tc_reachability(np.logical_or.reduce(found[rows == row]), refined.weights)
+        for row in range(len(refined.origin))
+    ]
+    mean, low, high = intervals_of(np.array(fractions))
+    success = RefinedSuccess(mean=mean, low=low, high=high, samples=samples)
+    return dataclasses.replace(refined, success=success)
 
 
 def _as_table(table: SetTable, found: list[tuple[IntArray, Estimates]]) -> SuccessTable:

@@ -142,7 +142,9 @@ def select(
     if refined and tables.refined is not None:
         compared = RefinedQuery(tables, tables.refined, here, legs, travel, weights, max_members)
         limbs = match is not None and len(match.by_frame) > 1
-        only_grid = grid_only(constraints, weights, limbs=limbs, motions=motions is not None)
+        only_grid = grid_only(
+            tables.refined, constraints, weights, limbs=limbs, motions=motions is not None
+        )
         best, *others = compared.beside([best, *others], constraints, only_grid, top)
     seconds = time.perf_counter() - start
     return replace(best, alternatives=tuple(others), match=match, seconds=seconds)

@@ -125,7 +125,12 @@ class RefinedQuery:
         cost, order = shortest_tour(from_here, between)
         scores = (float(refined.reachability[row]), float(refined.manipulability[row]), cost)
         moves = changed_axes(here, members)
-        net = utility(*scores, self.weights.of_size(count))
+        success, interval, low = None, None, None
+        if refined.success is not None:
+            success = float(refined.success.mean[row])
+            interval = (float(refined.success.low[row]), float(refined.success.high[row]))
+            low = interval[0]
+        net = utility(*scores, self.weights.of_size(count), low)
         if here.environment and moves:
             net -= float(self.weights.environment)
         return Choice(
@@ -135,11 +140,11 @@ class RefinedQuery:
             reachability=scores[0],
             manipulability=scores[1],
             cost=cost,
-            utility=utility(*scores, self.weights),
+            utility=utility(*scores, self.weights, low),
             net_utility=net,
             moves=moves,
-            success=None,
-            success_ci95=None,
+            success=success,
+            success_ci95=interval,
             unreachable=int(np.count_nonzero(~self.legs.reachable[self.tables.sets.cell])),
             seconds=0.0,
             refined=row,
@@ -193,11 +198,17 @@ class RefinedQuery:
 
 
 def grid_only(
-    constraints: Constraints, weights: UtilityWeights, *, limbs: bool, motions: bool
+    refined: RefinedTable,
+    constraints: Constraints,
+    weights: UtilityWeights,
+    *,
+    limbs: bool,
+    motions: bool,
 ) -> tuple[str, ...]:
     """Return what is requested that refined sets cannot answer, for a warning.
 
     Args:
+        refined: The refined sets.
         constraints: Constraints of the selection.
         weights: Weights of the utility.
         limbs: Whether limbs are observed in several tables.
@@ -208,6 +219,6 @@ def grid_only(
         "preferences": bool(constraints.prefer),
         "limbs in several tables": limbs,
         "motions": motions,
-        "success under error": weights.success > 0.0,
+        "success under error": weights.success > 0.0 and refined.success is None,
     }
     return tuple(name for name, wanted in requested.items() if wanted)

@@ -8,7 +8,7 @@ import numpy as np
 
 from tcs.errors import StoreFormatError
 from tcs.files.compression import compress, decompress, smallest_unsigned
-from tcs.placement.tables import RefinedTable
+from tcs.placement.tables import RefinedSuccess, RefinedTable
 from tcs.placement.tables.success import NO_MEMBER
 
 
@@ -23,6 +23,7 @@ def encode_refined(refined: RefinedTable | None) -> dict[str, Any] | None:
         "dexterity": compress(refined.dexterity),
         "arm_joints": compress(refined.arm_joints),
         "objective": compress(refined.objective),
+        "success": None if refined.success is None else _encode_success(refined.success),
     }
 
 
@@ -53,4 +54,21 @@ def decode_refined(encoded: object, weights: np.ndarray[Any, Any]) -> RefinedTab
         arm_joints=decompress(encoded, "arm_joints", "f4", (*shape, 7)),
         objective=decompress(encoded, "objective", "f8", origin.shape[:1]),
         weights=weights,
+        success=_decode_success(encoded.get("success"), origin.shape[:1]),
     )
+
+
+def _encode_success(success: RefinedSuccess) -> dict[str, Any]:
+    """Return the plain containers that `_decode_success` takes."""
+    arrays = {"mean": success.mean, "low": success.low, "high": success.high}
+    return {**{name: compress(array) for name, array in arrays.items()}, "samples": success.samples}
+
+
+def _decode_success(encoded: object, shape: tuple[int, ...]) -> RefinedSuccess | None:
+    """Return the encoded success of refined sets; None without one."""
+    if encoded is None:
+        return None
+    if not isinstance(encoded, dict) or type(encoded.get("samples")) is not int:
+        raise StoreFormatError("has an invalid success of its refined sets")
+    mean, low, high = (decompress(encoded, name, "f8", shape) for name in ("mean", "low", "high"))
+    return RefinedSuccess(mean=mean, low=low, high=high, samples=encoded["samples"])

@@ -28,6 +28,34 @@ class RefinedSet(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class RefinedSuccess(ArrayTable):
+    """Estimated success of K refined sets under error, in the samples of the table's estimates."""
+
+    mean: NDArray[np.float64]
+    """Mean over the samples, shape (K,)."""
+    low: NDArray[np.float64]
+    """Lower end of the 95 % interval of the mean, shape (K,)."""
+    high: NDArray[np.float64]
+    """Upper end, shape (K,)."""
+    samples: int
+    """Number of samples."""
+
+    def __post_init__(self) -> None:
+        """Check the arrays against each other and make them read-only.
+
+        Raises:
+            TcsError: If an array has the wrong type, shape or range.
+        """
+        count = length_of(self.mean)
+        names = ("mean", "low", "high")
+        self._check_arrays("refined success", {name: (np.float64, (count,)) for name in names})
+        inside = (self.low >= 0.0) & (self.low <= self.mean)
+        inside &= (self.mean <= self.high) & (self.high <= 1.0)
+        require(bool(np.all(inside)), "refined success: 0 <= low <= mean <= high <= 1 must hold.")
+        require(self.samples > 0, "refined success: samples must be positive.")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class RefinedTable(ArrayTable):
     """K sets of configurations that need not be on the grid, best first; arrays are read-only.
 
@@ -49,6 +77,8 @@ class RefinedTable(ArrayTable):
     """Value of the objective that was maximised, shape (K,)."""
     weights: NDArray[np.float64]
     """Weights of the goals, sum 1, shape (G,)."""
+    success: RefinedSuccess | None = None
+    """Their success under error; None unless that of the table's sets was estimated."""
 
     def __post_init__(self) -> None:
         """Check the arrays against each other and make them read-only.
@@ -87,6 +117,11 @@ class RefinedTable(ArrayTable):
             bool(np.all(self.weights >= 0.0))
             and abs(float(self.weights.sum()) - 1.0) <= WEIGHT_SUM_TOLERANCE,
             "refined table: weights must be >= 0 and sum to 1.",
+        )
+
+        require(
+            self.success is None or len(self.success.mean) == count,
+            "refined table: there must be one success for each set.",
         )
 
     def members(self, grid: Grid, row: int) -> tuple[InitialConfiguration, ...]:

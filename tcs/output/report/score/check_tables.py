@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from tcs.output.report.blocks import Cell, Column, Table, Tone
 from tcs.output.report.score.report import ScoreReport
+from tcs.output.report.score.shown_set import estimate_of
 from tcs.output.words import member_text, percent, percentage
 from tcs.output.words.verification import check_lines
 
@@ -35,28 +36,25 @@ def success_table(report: ScoreReport) -> Table | None:
     if success is None:
         return None
     sets = report.scored.sets
-    named = [("the set shown here", report.shown.stored)]
-    named += [
-        (f"most robust set of {'one' if most == 1 else f'up to {most}'}", members)
-        for most in range(1, success.members.shape[1] + 1)
-        if (members := success.most_robust(sets, max_members=most))
-    ]
+    shown = report.shown
+    named = [("the set shown here", shown.members, report.scores, shown.success)]
+    for most in range(1, success.members.shape[1] + 1):
+        if flat := success.most_robust(sets, max_members=most):
+            name = f"most robust set of {'one' if most == 1 else f'up to {most}'}"
+            configurations = tuple(report.job.grid.configuration(h) for h in flat)
+            named.append((name, configurations, sets.scores_of(flat), estimate_of(success, flat)))
     rows: list[list[Cell | str]] = []
-    for name, members in named:
-        row = success.row_of(members) if members else None
-        reachability, manipulability = sets.scores_of(members) if members else (0.0, 0.0)
-        poses = [member_text(report.job.grid.configuration(h).to_json()) for h in members]
+    for name, members, scores, found in named:
         estimate = ["no estimate", "–", "–"]
-        if row is not None:
-            low, high = percent(float(success.low[row])), percent(float(success.high[row]))
-            mean = percentage(float(success.success[row]))
-            estimate = [mean, f"{low} to {high}", f"{int(success.samples[row]):,}"]
+        if found is not None:
+            interval = f"{percent(found.low)} to {percent(found.high)}"
+            estimate = [percentage(found.mean), interval, f"{found.samples:,}"]
         rows.append(
             [
                 name,
-                " and ".join(poses) or "none",
-                percentage(reachability),
-                f"{manipulability:.3f}",
+                " and ".join(member_text(member.to_json()) for member in members) or "none",
+                percentage(scores[0]),
+                f"{scores[1]:.3f}",
                 *estimate,
             ]
         )

@@ -165,8 +165,7 @@ def _success(report: ScoreReport) -> list[Block]:
         ),
         table,
     ]
-    members = report.shown.stored
-    if members and report.success is not None and report.success.row_of(members) is None:
+    if report.shown.members and report.shown.success is None:
         blocks.append(
             Text(
                 "There is no estimate for the set shown here. `tcs evaluate` estimates the best "

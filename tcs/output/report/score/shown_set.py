@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +14,20 @@ from tcs.output.words import base_pose_text, goal_names, member_places, scores_t
 from tcs.placement.refinement import refined_table, score_members
 from tcs.placement.selection import SelectionTables, UtilityWeights, nearest_table, select
 from tcs.placement.store import ScoreFile
-from tcs.placement.tables import RefinedSet, ScoreTable
+from tcs.placement.tables import RefinedSet, ScoreTable, SuccessTable
+
+
+class SuccessEstimate(NamedTuple):
+    """Estimated success of a set under error."""
+
+    mean: float
+    """Mean of P_R over the samples."""
+    low: float
+    """Lower end of its 95 % interval."""
+    high: float
+    """Upper end."""
+    samples: int
+    """Number of samples."""
 
 
 @dataclass(frozen=True)
@@ -107,6 +121,19 @@ class ShownSet:
         return tuple(sorted(self.indices)) if self.refined is None else ()
 
     @property
+    def success(self) -> SuccessEstimate | None:
+        """Its estimated success under error; None without an estimate."""
+        table = self.file.tables[self.table]
+        if self.refined is None:
+            return estimate_of(table.success, self.stored)
+        found = refined_table(self.file, self.table).success
+        if found is None:
+            return None
+        row = self.refined.row
+        mean, low, high = (float(array[row]) for array in (found.mean, found.low, found.high))
+        return SuccessEstimate(mean, low, high, found.samples)
+
+    @property
     def places(self) -> list[str]:
         """Where each member is relative to the person, as a sentence; "" without a person."""
         return member_places(self.file, self.table, self.indices, self.members)
@@ -178,3 +205,17 @@ def _best_of(file: ScoreFile, table: int, max_members: int | None) -> tuple[int,
     tables = SelectionTables.of(file, table)
     choice = select(tables, anywhere, weights=free, max_members=max_members, refined=False)
     return choice.indices
+
+
+def estimate_of(success: SuccessTable | None, members: tuple[int, ...]) -> SuccessEstimate | None:
+    """Return the estimate of a set of the grid; None without one.
+
+    Args:
+        success: The table's estimates.
+        members: Flat configuration indices, ascending.
+    """
+    row = success.row_of(members) if success is not None and members else None
+    if success is None or row is None:
+        return None
+    mean, low, high = (float(of[row]) for of in (success.success, success.low, success.high))
+    return SuccessEstimate(mean, low, high, int(success.samples[row]))

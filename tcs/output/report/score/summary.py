@@ -122,13 +122,10 @@ def _soundness(report: ScoreReport) -> str:
 
 def _success(report: ScoreReport) -> list[str]:
     """Return the estimated success of the set under error, if there is an estimate."""
-    success = report.success
-    members = report.shown.stored
-    row = success.row_of(members) if success is not None and members else None
-    if success is None or row is None:
+    found = report.shown.success
+    if found is None:
         return []
-    low, high = percent(float(success.low[row])), percentage(float(success.high[row]))
     return [
-        "Estimated success in the randomly perturbed environment: "
-        f"{percentage(float(success.success[row]))} of the goals (95% between {low} and {high})."
+        f"Estimated success in the randomly perturbed environment: {percentage(found.mean)} of the "
+        f"goals (95% between {percent(found.low)} and {percentage(found.high)})."
     ]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import NamedTuple, Self
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -16,15 +16,16 @@ from tcs.kernel.problem import Problem, build_problem, with_environment
 from tcs.kernel.sweep import blocked_grippers, gripper_contacts
 from tcs.model.grid import ROBOT_AXES
 from tcs.model.scene import environment_at, torso_at
-from tcs.placement.refinement.points import Points
 from tcs.placement.robustness.displacements import displaced, samples_of
 from tcs.placement.robustness.error_model import Offsets
 from tcs.placement.robustness.perturbed_scenes import BasePoses, PerturbedScenes, Run
 from tcs.placement.robustness.trials import ArmTrials, Trials
-from tcs.placement.tables import Reason
+from tcs.placement.tables import Points, Reason
 
 BATCH = 50
 """Samples of a configuration that a thread evaluates at a time: some ten milliseconds of work."""
+KEPT_SAMPLES = 10_000
+"""Samples of environments that are kept: some hundred megabytes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +38,9 @@ class PerturbedPoints:
     """Errors of the joints, shapes (samples,)."""
     jobs: int
     """Number of threads; the result does not depend on it."""
+    environments: dict[tuple[Any, ...], PerturbedScenes] = field(default_factory=dict, repr=False)
+    """The states of the environment that were evaluated last, in all samples; the robot in them is
+    in some state."""
 
     @property
     def samples(self) -> int:
@@ -45,11 +49,19 @@ class PerturbedPoints:
 
     def hardest(self, count: int) -> Self:
         """Return the samples with the largest errors, each in units of its joint's spread."""
+        return self.only(np.sort(self.order[:count]))
+
+    @property
+    def order(self) -> NDArray[np.intp]:
+        """Numbers of the samples, the largest errors first, shape (samples,)."""
         spread = {name: values.std() or 1.0 for name, values in self.offsets.items()}
         size = np.sum([(v / spread[name]) ** 2 for name, v in self.offsets.items()], axis=0)
-        rows = np.sort(np.argsort(-size, kind="stable")[:count])
+        return np.argsort(-size, kind="stable")
+
+    def only(self, rows: NDArray[np.intp]) -> Self:
+        """Return some of the samples."""
         of_rows = {name: values[rows] for name, values in self.offsets.items()}
-        return dataclasses.replace(self, offsets=of_rows)
+        return dataclasses.replace(self, offsets=of_rows, environments={})
 
     def reached(self, points: Points) -> BoolArray:
         """Return which goals each configuration reaches in each sample, shape (n, samples, G)."""
@@ -109,17 +121,34 @@ class PerturbedPoints:
                     yield _Part(scenes, poses, run, int(rows[i]))
 
     def _scenes(self, arm: ArmTrials, robot: Problem, state: dict[str, float]) -> PerturbedScenes:
-        """Return one state of the environment in all samples."""
-        nominal = {**self.trials.observed, **state}
-        positions, _ = displaced(arm.job, arm.scene, nominal, self.offsets)
-        samples = (
-            {name: float(values[i]) for name, values in positions.items()}
-            for i in range(self.samples)
+        """Return one state of the environment in all samples.
+
+        Its arrays take a call of Drake for each sample: the last states are kept.
+        """
+        key = (id(arm), *state.items())
+        known = self.environments.pop(key, None)
+        if known is None:
+            nominal = {**self.trials.observed, **state}
+            positions, _ = displaced(arm.job, arm.scene, nominal, self.offsets)
+            samples = (
+                {name: float(values[i]) for name, values in positions.items()}
+                for i in range(self.samples)
+            )
+            problem = with_environment(
+                robot, environment_at(arm.lowered, arm.scene, arm.job.task, samples)
+            )
+            known = PerturbedScenes(problem, gripper_contacts(problem))
+            while self.environments and len(self.environments) * self.samples >= KEPT_SAMPLES:
+                self.environments.pop(next(iter(self.environments)))
+        self.environments[key] = known
+        of = known.problem
+        problem = robot._replace(
+            environment=of.environment,
+            goal_R=of.goal_R,
+            goal_p=of.goal_p,
+            environment_states=of.environment_states,
         )
-        problem = with_environment(
-            robot, environment_at(arm.lowered, arm.scene, arm.job.task, samples)
-        )
-        return PerturbedScenes(problem, gripper_contacts(problem))
+        return PerturbedScenes(problem, known.grippers)
 
 
 class _Part(NamedTuple):

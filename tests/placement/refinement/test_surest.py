@@ -1,0 +1,169 @@
+"""The surest sets: pairs of all candidates compared with plain loops, and the search from them."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+import tcs
+from tcs.placement.refinement import PointScorer
+from tcs.placement.refinement.floor import RememberedSamples, successes
+from tcs.placement.refinement.space import Space
+from tcs.placement.refinement.staged import StagedSamples, best_pairs
+from tcs.placement.refinement.surest import SurestSearch, surest_pairs
+from tcs.placement.robustness import PerturbedPoints, Trials
+from tcs.placement.tables import Points
+
+BESIDE = """
+based_on: wheelchair
+name: beside
+title: A few places beside the wheelchair
+grid:
+  base_x: {unit: m, start: 0.6, step: 0.2, count: 4}
+  base_y: {unit: m, start: -0.95, step: 1.7, count: 2}
+  base_yaw: {unit: deg, start: 90, step: 90, count: 2}
+  torso: {unit: m, start: 0.15, step: 0.15, count: 2}
+"""
+SAMPLES = 40
+
+
+class Made:
+    """Samples in which a configuration reaches what a table says, by its first value."""
+
+    def __init__(self, reached, rows=None):
+        self.all = reached
+        self.rows = np.arange(reached.shape[1]) if rows is None else rows
+        self.evaluated = []
+
+    @property
+    def samples(self):
+        return self.rows.size
+
+    @property
+    def order(self):
+        return np.arange(self.samples)[::-1]
+
+    def only(self, rows):
+        return Made(self.all, self.rows[rows])
+
+    def reached(self, points):
+        self.evaluated += points.values[:, 0].astype(int).tolist()
+        return self.all[points.values[:, 0].astype(int)][:, self.rows]
+
+
+def points(*numbers):
+    return Points(np.array(numbers, dtype=float)[:, None], np.zeros(len(numbers), dtype=np.int64))
+
+
+@pytest.fixture
+def made(rng):
+    weights = np.array([0.5, 0.3, 0.2])
+    return Made(rng.uniform(size=(9, 600, 3)) < 0.6), weights
+
+
+def test_stages_end_with_all_samples_and_begin_with_the_hardest(made):
+    samples, weights = made
+    staged = StagedSamples.of(samples, weights)
+    assert [part.samples for part in staged.parts] == [32, 96, 384, 88]
+    assert staged.parts[0].of.rows.tolist() == list(range(599, 567, -1))
+    found = staged.successes([points(1, 2), points(3)], 3)
+    reached = samples.all.astype(float)
+    expected = [
+        np.maximum(reached[1], reached[2]).mean(axis=0) @ weights,
+        reached[3].mean(0) @ weights,
+    ]
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    first = staged.successes([points(3)], 0)[0]
+    assert first == pytest.approx(reached[3, 568:].mean(axis=0) @ weights)
+
+
+def test_a_configuration_is_evaluated_once_in_each_part(made):
+    samples, weights = made
+    staged = StagedSamples.of(samples, weights)
+    for _ in range(2):
+        staged.features(points(4, 5), 1)
+        staged.successes([points(4, 5)], 1)
+    assert [len(part.of.evaluated) for part in staged.parts] == [2, 2, 0, 0]
+
+
+@pytest.mark.parametrize("count", [1, 5, 100])
+def test_the_best_pairs_are_those_of_a_plain_loop(made, rng, monkeypatch, count):
+    monkeypatch.setattr("tcs.placement.refinement.staged.CHUNK", 4)
+    samples, weights = made
+    staged = StagedSamples.of(samples, weights)
+    features = staged.features(points(*range(9)), 3)
+    allowed = np.triu(rng.uniform(size=(9, 9)) < 0.7, 1)
+    first, second = best_pairs(features, features, allowed, np.zeros((9, 9)), count)
+    pairs = [(a, b) for a, b in itertools.combinations(range(9), 2) if allowed[a, b]]
+    success = dict(zip(pairs, staged.successes([points(a, b) for a, b in pairs], 3), strict=True))
+    found = [success[a, b] for a, b in zip(first.tolist(), second.tolist(), strict=True)]
+    # Features are single precision.
+    np.testing.assert_allclose(found, sorted(success.values())[::-1][:count], atol=1e-6)
+
+
+@pytest.fixture(scope="module")
+def scored(tmp_path_factory):
+    environment = tmp_path_factory.mktemp("beside") / "beside.yaml"
+    environment.write_text(BESIDE)
+    return tcs.score("shaving", environment)
+
+
+@pytest.fixture(scope="module")
+def search(scored):
+    trials = Trials.of(scored)
+    samples = PerturbedPoints(trials, trials.errors.draw(SAMPLES, 0, stream="refinement"), 2)
+    staged = StagedSamples.of(samples, trials.weights)
+    space = Space.of(scored.configurations, scored.nominal.sets)
+    return SurestSearch.of(PointScorer.of(scored, 0), space, staged, np.random.default_rng(0))
+
+
+def test_the_first_start_is_the_surest_pair_of_all_candidates(scored, search):
+    sets = scored.nominal.sets
+    found = surest_pairs(search.staged, search, sets, 3, 0.3)
+    at = sets.cell_xy[sets.cell]
+    pairs = [
+        (int(sets.candidates[a]), int(sets.candidates[b]))
+        for a, b in itertools.combinations(range(len(sets.candidates)), 2)
+        if np.hypot(*(at[a] - at[b])) >= sets.min_distance - 1e-9
+    ]
+    success = search.staged.successes([search.points_of(pair) for pair in pairs], 1)
+    first = search.staged.successes([search.points_of(found[0])], 1)[0]
+    assert first == pytest.approx(success.max(), abs=1e-6)
+    assert len(set(found)) == len(found) > 1
+
+
+def test_walks_are_surer_in_all_samples_with_every_move(search, scored):
+    sets = scored.nominal.sets
+    walks, _ = search.run([sets.best, sets.best_single], 3, lambda done, total: None)
+    last = search.staged.stages - 1
+    moved = 0
+    for walk in walks:
+        found = search.staged.successes([place.points for place, _ in walk.course], last)
+        assert np.all(np.diff([value for _, value in walk.course]) > 0.0)
+        assert np.all(np.diff(found) > -1e-3)
+        moved += len(walk.passed)
+    assert moved > 0
+
+
+def test_a_set_that_loses_nothing_stays(search, scored, monkeypatch):
+    monkeypatch.setattr(StagedSamples, "successes", lambda self, sets, stage: np.ones(len(sets)))
+    walks, _ = search.run([scored.nominal.sets.best], 3, lambda done, total: None)
+    assert walks[0].passed == []
+
+
+def test_success_and_its_pairs_through_the_product(scored, monkeypatch):
+    monkeypatch.setattr("tcs.placement.refinement.refined_file.FRESH_SAMPLES", 30)
+    refined = tcs.refine(scored, objective="success", starts=1, rounds=1, samples=SAMPLES)
+    sets, table = scored.nominal.sets, refined.nominal.refined
+    trials = Trials.of(scored)
+    # The place is chosen in samples of their own, the starts among them.
+    choosing = trials.errors.draw(SAMPLES, 0, stream="refinement choice")
+    samples = RememberedSamples(PerturbedPoints(trials, choosing, 2))
+    values = table.values[0, : table.sizes[0]]
+    chosen = Points(values, np.zeros(len(values), dtype=np.int64))
+    at = np.stack([*scored.configurations.values(np.array(sets.best)).values()], axis=1)
+    best = Points(at, np.zeros(len(at), dtype=np.int64))
+    found, before = successes(samples, trials.weights, [chosen, best])
+    assert found >= before
