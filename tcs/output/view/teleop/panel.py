@@ -29,6 +29,8 @@ COLOURS: Mapping[str, str] = {FREE: "#2ca02c", LIMIT: "#ff2020", SINGULAR: "#ff0
 """Colours of a bar, as in the paper: green, red at a limit, magenta at a singularity."""
 _TRACKS: Mapping[str, str] = {FREE: "#c8ccd4", LIMIT: "#ff9a9a", SINGULAR: "#ffa6ff"}
 """Colours of the rest of a joint's range, visible where the bar is short."""
+_WORDS: Mapping[str, str] = {LIMIT: "limit", SINGULAR: "singular"}
+"""Words on a bar, by which its state is told apart without its colour."""
 LINES = ("mode", "message")
 _INK = {"mode": "#ffffff", "message": "#ffd24d"}
 _DISTANCE = 0.05
@@ -212,6 +214,11 @@ class Panel:
             self._quad(f"bar/{i}/{state}/track", _TRACKS[state], width, height, track)
             if self._bounded[i]:
                 self._quad(f"bar/{i}/{state}/fill", colour, width, height, (middle, 0.0, 0.003))
+            if state in _WORDS:
+                # Centred on the bar.
+                word = _WORDS[state]
+                at = (middle - 0.5 * ADVANCE * _SMALL * len(word), -0.4 * _SMALL, 0.004)
+                self._write(f"{bar(i)}/{state}/word", word, "#101010", _SMALL, at)
         self._quad(f"bar/{i}/mark", "#101010", _MARK, height + 0.05, (0.0, 0.0, 0.005))
         name = f"joint {i + 1}"
         left = x - 0.5 * width

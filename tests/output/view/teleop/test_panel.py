@@ -96,6 +96,13 @@ def test_one_colour_of_each_bar_is_seen(spy, iiwa, ready):
             assert seen == [f"{bar(i)}/{state}"]
 
 
+def test_bars_are_told_apart_by_words_too(spy, iiwa):
+    Panel(spy, iiwa)
+    for i in range(7):
+        words = [path for path in spy.drawn if path.startswith(bar(i)) and path.endswith("/word")]
+        assert words == [f"{bar(i)}/{state}/word" for state in (LIMIT, SINGULAR)]
+
+
 def test_only_what_changes_is_sent(spy, iiwa, ready):
     panel = Panel(spy, iiwa)
     panel.show(shown(iiwa, ready, message="one"))
