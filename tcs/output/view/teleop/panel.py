@@ -217,8 +217,8 @@ class Panel:
             if state in _WORDS:
                 # Centred on the bar.
                 word = _WORDS[state]
-                at = (middle - 0.5 * ADVANCE * _SMALL * len(word), -0.4 * _SMALL, 0.004)
-                self._write(f"{bar(i)}/{state}/word", word, "#101010", _SMALL, at)
+                begin = (middle - 0.5 * ADVANCE * _SMALL * len(word), -0.4 * _SMALL, 0.004)
+                self._write(f"{bar(i)}/{state}/word", word, "#101010", _SMALL, begin)
         self._quad(f"bar/{i}/mark", "#101010", _MARK, height + 0.05, (0.0, 0.0, 0.005))
         name = f"joint {i + 1}"
         left = x - 0.5 * width
