@@ -147,12 +147,19 @@ def with_earlier(saved: dict[str, Any], before: dict[str, Any]) -> dict[str, Any
         if new is not None and (old is None or new.get("columns") != old.get("columns", ())):
             tables[name] = new
             continue
-        measured = {cells[0]: cells for cells in (new["rows"] if new else ())}
-        kept = [cells[0] for cells in old.get("rows", [["all"]]) if cells[0] not in measured]
+        measured: dict[str, list[list[str]]] = {}
+        for cells in new["rows"] if new else ():
+            measured.setdefault(cells[0], []).append(cells)
+        before_of = [cells[0] for cells in old.get("rows", [["all"]])]
+        kept = [first for first in dict.fromkeys(before_of) if first not in measured]
         tables[name] = old
         if new is not None:
-            rows = [measured.pop(cells[0], cells) for cells in old["rows"]]
-            tables[name] = {**new, "rows": [*rows, *measured.values()]}
+            # Rows of one first cell stay together, where they were.
+            rows: dict[str, list[list[str]]] = {first: [] for first in before_of} | measured
+            for cells in old["rows"]:
+                if cells[0] not in measured:
+                    rows[cells[0]].append(cells)
+            tables[name] = {**new, "rows": [cells for group in rows.values() for cells in group]}
         runs = _runs_of(kept, name, saved, before)
         if runs:
             earlier[name] = runs

@@ -53,6 +53,14 @@ def test_rows_and_tables_that_a_run_did_not_measure_are_kept(run):
     assert saved["earlier"]["rows"][0]["load"] == "1"
 
 
+def test_all_rows_of_a_first_cell_are_replaced_together(run):
+    run("", {"rows": [["a", "1"], ["a", "2"], ["b", "3"], ["c", "4"], ["c", "5"]]}, load="1")
+    saved = run("--rows a b", {"rows": [["b", "6"], ["b", "7"], ["a", "8"]]}, load="2")
+    rows = saved["tables"]["rows"]["rows"]
+    assert rows == [["a", "8"], ["b", "6"], ["b", "7"], ["c", "4"], ["c", "5"]]
+    assert [run["rows"] for run in saved["earlier"]["rows"]] == [["c"]]
+
+
 def test_rows_are_of_the_run_that_measured_them_last(run):
     run("", {"rows": [["a", "1"], ["b", "2"], ["c", "3"]]}, load="1")
     run("--rows b", {"rows": [["b", "4"]]}, load="2")
