@@ -93,6 +93,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "engines": (),
     "scale": (),
     "faults": (),
+    "kills": (),
     "edges": (),
     "fuzz": ("--mutants", "5000"),
     "fuzz_options": (),

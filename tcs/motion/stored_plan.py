@@ -21,6 +21,10 @@ from tcs.motion.timing import Timed
 
 MAX_BYTES = 256 * 1024**2
 """Greatest size of a plan [bytes]; that of a task takes some hundred kilobytes."""
+_MOST = 1e9
+"""Greatest absolute number of a plan: accelerations of larger ones would overflow."""
+_LEAST_STEP = 1e-12
+"""Least step of the times of a segment [s], likewise."""
 SEGMENT_TYPES = ("move", "approach", "retreat")
 _BASE = ("base_x", "base_y", "base_yaw_deg", "torso")
 _STOP = (*_BASE, "configuration", "goals", "returns", "duration", "segments")
@@ -98,7 +102,7 @@ def _segment(plain: Mapping[str, Any]) -> Segment:
     shape = (len(times), 7)
     if len(times) < 2 or positions.shape != shape or velocities.shape != shape:
         raise ValueError("a segment must have seven positions and velocities for each of its times")
-    if times[0] != 0.0 or not np.all(np.diff(times) > 0.0):
+    if times[0] != 0.0 or not np.all(np.diff(times) >= _LEAST_STEP):
         raise ValueError("the times of a segment must ascend from 0")
     start, end = (None if plain[key] == "rest" else int(plain[key]) for key in ("from", "to"))
     curve = Curve(times, positions, velocities)
@@ -128,4 +132,6 @@ def _array(value: Any, dimensions: int) -> FloatArray:
     array = np.array(value, dtype=np.float64)
     if array.ndim != dimensions or not np.all(np.isfinite(array)):
         raise ValueError("numbers must be finite, in lists of equal length")
+    if np.any(np.abs(array) > _MOST):
+        raise ValueError(f"numbers must be at most {_MOST:g}")
     return array

@@ -97,6 +97,8 @@ def test_a_plan_for_other_models_is_refused(changed):
         lambda plain: plain["stops"][0]["segments"][0].update(type="jump"),
         lambda plain: plain["stops"][0]["segments"][0].update(times=[0.0, 0.0]),
         lambda plain: plain["stops"][0]["segments"][0]["positions"].pop(),
+        lambda plain: plain["stops"][0]["segments"][0]["velocities"][1].__setitem__(0, 1e300),
+        lambda plain: plain["stops"][0]["segments"][0]["times"].__setitem__(1, 1e-300),
     ],
 )
 def test_damaged_plans_are_one_line(changed, change):
