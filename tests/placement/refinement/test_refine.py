@@ -351,6 +351,23 @@ def test_perturbed_points_on_the_grid_are_those_of_trials(scored):
     assert found.any()
 
 
+def test_kept_environments_change_no_answer(scored):
+    trials = Trials.of(scored)
+    offsets = trials.errors.draw(12, 3)
+    low, high = (
+        np.stack([*scored.configurations.values(np.array([h])).values()], axis=1)
+        for h in (scored.nominal.sets.candidates[0], scored.nominal.sets.candidates[-1])
+    )
+    low[0, -1], high[0, -1] = 0.15, 0.30
+    kept = PerturbedPoints(trials, offsets, 1)
+    for values in (low, high, low):
+        points = Points(values, np.zeros(1, dtype=np.int64))
+        fresh = PerturbedPoints(trials, offsets, 1).reached(points)
+        np.testing.assert_array_equal(kept.reached(points), fresh)
+    assert len(kept.environments) == 1
+    assert np.any(kept.reached(Points(low, points.arm)) != kept.reached(Points(high, points.arm)))
+
+
 @pytest.mark.parametrize("objective", ["success", "margin", "ball"])
 def test_success_is_judged_on_other_samples(scored, monkeypatch, objective):
     monkeypatch.setattr("tcs.placement.refinement.refined_file.FRESH_SAMPLES", 30)
