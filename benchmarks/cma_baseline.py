@@ -15,10 +15,10 @@ import numpy as np
 
 import tcs
 from tcs.kernel.arrays import FloatArray
-from tcs.placement.refinement import Points, PointScorer
+from tcs.placement.refinement import PointScorer
 from tcs.placement.refinement.objectives import TOC_TOGETHER
 from tcs.placement.refinement.space import Space
-from tcs.placement.tables import tc_manipulability, tc_reachability
+from tcs.placement.tables import Points, tc_manipulability, tc_reachability
 
 POPULATION, POPULATION_WITH_ENVIRONMENT = 1600, 3600
 ITERATIONS, CMEAN = 10, 0.25

@@ -30,10 +30,9 @@ from table import CHECKOUT, header, parser, record, row, save, saved_rows
 
 import tcs
 from tcs.kernel.arrays import FloatArray
-from tcs.placement.refinement import Points
 from tcs.placement.robustness import PerturbedPoints, Trials
 from tcs.placement.scoring import task_environment_pairs
-from tcs.placement.tables import tc_reachability
+from tcs.placement.tables import Points, tc_reachability
 
 MEASURE = "jlwki"
 ERRORS = """errors:

@@ -16,14 +16,12 @@ from tcs.placement.refinement.members import (
 from tcs.placement.refinement.place import Placement, place
 from tcs.placement.refinement.points import PointScorer, PointScores
 from tcs.placement.refinement.refined_file import OBJECTIVES, refine
-from tcs.placement.tables import Points
 
 __all__ = [
     "OBJECTIVES",
     "Placement",
     "PointScorer",
     "PointScores",
-    "Points",
     "RefinedMembers",
     "evaluate_refined",
     "place",

@@ -102,7 +102,7 @@ class Walk:
         return len(self.origin)
 
 
-Condition = Callable[[Sequence[Points]], BoolArray]
+SetCondition = Callable[[Sequence[Points]], BoolArray]
 """Returns which of several sets satisfy a condition."""
 
 
@@ -125,8 +125,8 @@ class LocalSearch:
     space: Space
     objective: Objective
     rng: np.random.Generator
-    keeps: Condition | None = None
-    """Condition of the sets that walks move to, checked for few of them; None for none."""
+    keeps: SetCondition | None = None
+    """SetCondition of the sets that walks move to, checked for few of them; None for none."""
     screening_rounds: int = SCREENING_ROUNDS
     """Rounds after which only the best sets are refined further."""
 
@@ -296,13 +296,15 @@ class LocalSearch:
         return values
 
 
-def without_idle_members(walk: Walk, objective: Objective, keeps: Condition | None = None) -> Walk:
+def without_idle_members(
+    walk: Walk, objective: Objective, keeps: SetCondition | None = None
+) -> Walk:
     """Return a walk without members that add nothing to the objective; itself if all add something.
 
     Args:
         walk: The walk.
         objective: The objective.
-        keeps: Condition of the sets with fewer members; None for none.
+        keeps: SetCondition of the sets with fewer members; None for none.
     """
     for i in range(walk.members if walk.members > 1 else 0):
         others = [k for k in range(walk.members) if k != i]
