@@ -292,6 +292,20 @@ def test_the_lift_of_stretch_crosses_base_and_head_only_beyond_its_range(pair, n
     assert out <= 0.0
 
 
+def test_the_wrist_of_jaco_folds_into_itself_only_beyond_its_range():
+    robot = load_robot("jaco")
+    joint, pair = "j2s6s200_joint_5", ("j2s6s200_link_4", "j2s6s200_link_5")
+    assert pair in robot.disabled_pairs
+    lower, upper = robot.joint_limits()[joint]
+    assert (lower, upper) != robot.without_ranges.joint_limits()[joint]
+    within = [{joint: q} for q in np.linspace(lower, upper, 9)]
+    beyond = [{joint: q} for q in np.radians([31.0, 48.0, 312.0, 329.0])]
+    distances = mesh_distances(robot, pair, [*within, *beyond])
+    # The two seats of the joint are 0.13 mm apart.
+    assert distances[: len(within)].min() > 1e-4
+    assert distances[len(within) :].max() <= 0.0
+
+
 @pytest.mark.parametrize(("name", "side"), [("pr2", "l"), ("pr2_right", "r")])
 def test_shoulder_and_upper_arm_cross_only_beyond_the_range_of_the_lift(name, side):
     robot = load_robot(name)
