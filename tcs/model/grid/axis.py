@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
+from functools import lru_cache
 from typing import Self
 
 import numpy as np
@@ -15,6 +16,10 @@ from tcs.files.quantities import ANGLE_DEG, AXIS_VALUES, POSITION, STEP
 
 UNITS = ("m", "deg")
 """Units in which an axis may be written."""
+_KEPT_AXES = 256
+"""Most axes whose values are kept."""
+_KEPT_VALUES = 4096
+"""Most values of an axis that are kept; together with `_KEPT_AXES` they take 8 MB at most."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,11 +82,17 @@ class Axis:
         >>> Axis("base_yaw", "deg", 0.0, 90.0, 3).values.round(4).tolist()
         [0.0, 1.5708, 3.1416]
         """
-        # Converted to radians last, so that the multiples of a step are exact in degrees.
-        values: NDArray[np.float64] = (
-            self.start + np.arange(self.count, dtype=np.float64) * self.step
-        )
-        return np.deg2rad(values) if self.unit == "deg" else values
+        # Compiled functions distinguish arrays that can be written: those kept are copied.
+        return _kept_values(self).copy() if self.count <= _KEPT_VALUES else _values_of(self)
+
+    def value(self, index: int) -> float:
+        """Return the value of an index, as `values[index]` [m or rad].
+
+        >>> Axis("torso", "m", 0.0, 0.15, 3).value(2)
+        0.3
+        """
+        values = _kept_values(self) if self.count <= _KEPT_VALUES else _values_of(self)
+        return float(values[index])
 
     @property
     def held_unit(self) -> str:
@@ -139,6 +150,21 @@ class Axis:
             return cls(**known)  # type: ignore[arg-type]  # __post_init__ checks each value
         except GridError as error:
             raise GridError(f"{_prefix(where)}{error}") from None
+
+
+def _values_of(axis: Axis) -> NDArray[np.float64]:
+    """Return every value of an axis [m or rad], shape (count,)."""
+    # Converted to radians last, so that the multiples of a step are exact in degrees.
+    values: NDArray[np.float64] = axis.start + np.arange(axis.count, dtype=np.float64) * axis.step
+    return np.deg2rad(values) if axis.unit == "deg" else values
+
+
+@lru_cache(maxsize=_KEPT_AXES)
+def _kept_values(axis: Axis) -> NDArray[np.float64]:
+    """Return the values of an axis, computed once; read-only."""
+    values = _values_of(axis)
+    values.flags.writeable = False
+    return values
 
 
 _KEYS = tuple(field.name for field in fields(Axis))

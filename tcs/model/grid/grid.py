@@ -242,8 +242,12 @@ class Grid:
         Raises:
             GridError: If the index is not one of this grid.
         """
-        values = [float(value) for value in self.values(flat_index).values()]
-        return self.between(values, flat_index)
+        # Plain numbers: arrays of one element take five times as long.
+        rest, values = int(self._checked(flat_index)) % self.arm_size, []
+        for axis in reversed(self.axes):
+            rest, along = divmod(rest, axis.count)
+            values.append(axis.value(along))
+        return self.between(values[::-1], flat_index)
 
     def between(self, values: Sequence[float], near: int) -> InitialConfiguration:
         """Return a configuration that need not be on the grid.
@@ -348,8 +352,10 @@ class Grid:
             text = str(error).removeprefix("grid: ") if where.endswith("'grid'") else str(error)
             raise GridError(f"{where}: {text}" if where else text) from None
 
-    def _checked(self, flat: ArrayLike) -> NDArray[np.int64]:
+    def _checked(self, flat: ArrayLike | int) -> NDArray[np.int64]:
         """Return flat indices as an array; raise for those that are not of this grid."""
+        if type(flat) is int and 0 <= flat < self.size:
+            return np.asarray(flat, dtype=np.int64)
         checked = np.asarray(flat)
         if checked.dtype.kind not in "iu" and checked.size:
             raise GridError(f"grid: a configuration has a whole number as its index, not {flat!r}.")

@@ -69,6 +69,61 @@ class RelativePlace:
         return f"{', '.join([_SIDES[self.side], *beside, _FACINGS[self.facing]])}."
 
 
+@dataclass(frozen=True, slots=True)
+class PersonOnFloor:
+    """Where a person is on the floor, in the environment frame."""
+
+    origin: tuple[float, float]
+    """Middle of the frames of both sides of the body [m]."""
+    to_left: tuple[float, float]
+    """Unit vector to the person's left."""
+    ahead: tuple[float, float]
+    """Unit vector from the person's head to the feet."""
+    parts: tuple[tuple[str, float], ...]
+    """Parts of the body and their positions from `origin` along `ahead` [m]."""
+    sits: bool
+    """Whether the person sits."""
+
+    @classmethod
+    def of(cls, frames: Mapping[str, Sequence[float]]) -> PersonOnFloor | None:
+        """Return the person of body frames; None without frames of both sides of a body.
+
+        Args:
+            frames: Positions of the body frames in the environment frame [m].
+        """
+        left, right = _middle(frames, "_left"), _middle(frames, "_right")
+        if left is None or right is None or "head" not in frames:
+            return None
+        width = math.dist(left, right)
+        if width < 1e-6:
+            return None
+        to_left = ((left[0] - right[0]) / width, (left[1] - right[1]) / width)
+        ahead = (to_left[1], -to_left[0])
+        origin = ((left[0] + right[0]) / 2.0, (left[1] + right[1]) / 2.0)
+        parts = tuple(
+            (part, _along(at, origin, ahead))
+            for start, part in _LANDMARKS.items()
+            if (at := _middle(frames, start, at_start=True)) is not None
+        )
+        height = frames["head"][2] - frames.get("lower_body", frames["head"])[2]
+        return cls(origin, to_left, ahead, parts, height > _SITS)
+
+    def place(self, x: float, y: float, yaw: float) -> RelativePlace:
+        """Return where a base pose [m, rad] is relative to the person."""
+        aside, forward = (_along((x, y), self.origin, axis) for axis in (self.to_left, self.ahead))
+        low, high = min(at for _, at in self.parts), max(at for _, at in self.parts)
+        side = _side(aside, forward - low, high - forward, self.sits)
+        beside = None
+        if side in ("left", "right"):
+            # A sitting person's head and trunk are above the hips.
+            seen = [one for one in self.parts if not self.sits or one[0] in _SEATED]
+            beside, _ = min(seen or self.parts, key=lambda one: abs(one[1] - forward))
+        nearest = min(max(forward, low), high)
+        target = tuple(o + nearest * a for o, a in zip(self.origin, self.ahead, strict=True))
+        bearing = math.atan2(target[1] - y, target[0] - x) - yaw
+        return RelativePlace(side, beside, _facing(math.remainder(bearing, 2.0 * math.pi)))
+
+
 def frames_of_state(file: ScoreFile, table: int, state: int) -> dict[str, list[float]]:
     """Return the positions of the body frames in a state of the environment [m].
 
@@ -104,10 +159,22 @@ def member_places(
     for member, index in zip(
         members or [grid.configuration(h) for h in indices], indices, strict=True
     ):
-        frames = frames_of_state(file, table, int(grid.state_of(np.array([index]))[0]))
-        place = relative_place(member.base_x, member.base_y, member.base_yaw, frames)
-        texts.append("" if place is None else place.text)
+        person = _person_of(file, table, int(grid.state_of(index)))
+        texts.append(
+            ""
+            if person is None
+            else person.place(member.base_x, member.base_y, member.base_yaw).text
+        )
     return texts
+
+
+def _person_of(file: ScoreFile, table: int, state: int) -> PersonOnFloor | None:
+    """Return where the person is in a state of the environment; kept with the table."""
+    kept = file.tables[table].derived.setdefault("persons on the floor", {})
+    if state not in kept:
+        kept[state] = PersonOnFloor.of(frames_of_state(file, table, state))
+    found: PersonOnFloor | None = kept[state]
+    return found
 
 
 def place_in_line(place: str) -> str:
@@ -148,37 +215,13 @@ def relative_place(
     >>> relative_place(0.9, -0.8, math.pi / 2, frames)
     RelativePlace(side='right', beside='knees', facing='towards')
     """
-    left, right = _middle(frames, "_left"), _middle(frames, "_right")
-    if left is None or right is None or "head" not in frames:
-        return None
-    width = math.dist(left, right)
-    if width < 1e-6:
-        return None
-    to_left = ((left[0] - right[0]) / width, (left[1] - right[1]) / width)
-    ahead = (to_left[1], -to_left[0])
-    origin = ((left[0] + right[0]) / 2.0, (left[1] + right[1]) / 2.0)
+    person = PersonOnFloor.of(frames)
+    return None if person is None else person.place(x, y, yaw)
 
-    def along(point: Sequence[float], axis: tuple[float, float]) -> float:
-        return (point[0] - origin[0]) * axis[0] + (point[1] - origin[1]) * axis[1]
 
-    parts = {
-        part: along(at, ahead)
-        for start, part in _LANDMARKS.items()
-        if (at := _middle(frames, start, at_start=True)) is not None
-    }
-    aside, forward = along((x, y), to_left), along((x, y), ahead)
-    low, high = min(parts.values()), max(parts.values())
-    sits = frames["head"][2] - frames.get("lower_body", frames["head"])[2] > _SITS
-    side = _side(aside, forward - low, high - forward, sits)
-    beside = None
-    if side in ("left", "right"):
-        # A sitting person's head and trunk are above the hips.
-        seen = [part for part in parts if not sits or part in _SEATED] or list(parts)
-        beside = min(seen, key=lambda part: abs(parts[part] - forward))
-    nearest = min(max(forward, low), high)
-    target = (origin[0] + nearest * ahead[0], origin[1] + nearest * ahead[1])
-    bearing = math.atan2(target[1] - y, target[0] - x) - yaw
-    return RelativePlace(side, beside, _facing(math.remainder(bearing, 2.0 * math.pi)))
+def _along(point: Sequence[float], origin: tuple[float, float], axis: tuple[float, float]) -> float:
+    """Return the coordinate of a point along an axis from an origin [m]."""
+    return (point[0] - origin[0]) * axis[0] + (point[1] - origin[1]) * axis[1]
 
 
 def _side(aside: float, after_head: float, before_feet: float, sits: bool) -> str:

@@ -49,7 +49,7 @@ def check_within_axis(axis: Axis, value: float, *, lowest: float | None = None) 
     """
     if axis.count == 1:
         return
-    first, last = float(axis.values[0]), float(axis.values[-1])
+    first, last = axis.value(0), axis.value(-1)
     # Rounding of the steps must not refuse a value exactly half a step beyond an end.
     margin = (last - first) / (axis.count - 1) / 2.0 * (1.0 + 1e-9)
     low = first - margin if lowest is None else min(first - margin, lowest)

@@ -101,3 +101,15 @@ def test_override_replaces_what_it_names():
 def test_override_may_not_make_it_another_axis(changes, error):
     with pytest.raises(error, match=r"^here: axis 'base_x'"):
         Axis("base_x", "m", -1.5, 0.05, 61).overridden(changes, where="here")
+
+
+@pytest.mark.parametrize("count", [1, 61, 5000], ids=["one", "kept", "not kept"])
+@pytest.mark.parametrize("unit", ["m", "deg"])
+def test_values_belong_to_who_asks(count, unit):
+    axis = Axis("own", unit, -1.5, 0.05 if unit == "deg" else 0.0007, count)
+    first = axis.values
+    assert [axis.value(i) for i in (0, count - 1, -1)] == first[[0, -1, -1]].tolist()
+    expected = first.copy()
+    first += 1.0
+    np.testing.assert_array_equal(axis.values, expected)
+    assert axis.value(0) == expected[0]

@@ -117,6 +117,17 @@ def test_configuration_is_in_metres_and_radians():
     assert configuration.environment_units == ("m", "rad")
 
 
+@given(grids(), st.data())
+def test_configuration_has_the_values_of_its_index(grid, data):
+    flat = data.draw(st.integers(0, grid.size - 1))
+    for given_as in (flat, np.int32(flat), np.int64(flat)):
+        one = grid.configuration(given_as)
+        values = {axis.name: getattr(one, axis.name, None) for axis in grid.axes}
+        values |= dict(one.environment)
+        assert values == {name: float(value) for name, value in grid.values(flat).items()}
+        assert all(type(value) is float for value in values.values())
+
+
 def test_axis_by_name():
     grid = Grid.from_spec(WHEELCHAIR)
     assert grid.axis("torso") == Axis("torso", "m", 0, 0.15, 3)

@@ -5,11 +5,14 @@ from __future__ import annotations
 import itertools
 import math
 
+import numpy as np
+
 import tcs
 from tcs.output.terminal.tables import report_choice
 from tcs.output.words import (
     choice_in_words,
     explanation_in_words,
+    member_places,
     relative_place,
     summary_in_words,
 )
@@ -39,6 +42,18 @@ def test_each_stop_has_its_place():
         assert len(set(found["places"])) == 2
         turned.add(choice.order == tuple(sorted(choice.order)))
     assert turned == {True, False}
+
+
+def test_places_are_of_the_state_and_the_table():
+    turned = {name: (-x, -y, z) for name, (x, y, z) in BODY.items()}
+    file = score_file(body_frames={name: [*at, *turned[name]] for name, at in BODY.items()})
+    grid = file.configurations
+    for _ in range(2):
+        for index in range(grid.size):
+            member = grid.configuration(index)
+            frames = (BODY, turned)[int(grid.state_of(np.array([index]))[0])]
+            pose = (member.base_x, member.base_y, member.base_yaw)
+            assert member_places(file, 0, [index]) == [relative_place(*pose, frames).text]
 
 
 def test_alternatives_have_places_before_their_coordinates(capsys, monkeypatch):
