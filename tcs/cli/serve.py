@@ -111,6 +111,14 @@ def serve(
     router: Annotated[
         str, typer.Option(help="With --ros2: address of the router of rmw_zenoh.")
     ] = "tcp/localhost:7447",
+    prepare: Annotated[
+        bool,
+        typer.Option(
+            "--prepare/--no-prepare",
+            help="Once it answers, import Drake and load the kernel, so that the first job need "
+            "not; without, less memory is used until then. Not with --mcp.",
+        ),
+    ] = True,
     *,
     frames: _FrameOptions,
     jobs: options.Jobs = 2,
@@ -122,15 +130,18 @@ def serve(
         _serve_assistant(files, jobs)
         return
     if ros1:
-        _serve_ros1(files, frames, jobs)
+        _serve_ros1(files, frames, jobs, prepare=prepare)
         return
     if ros2:
-        _serve_ros2(files, frames, router, jobs)
+        _serve_ros2(files, frames, router, jobs, prepare=prepare)
         return
     http = _http("serve")
     access = http.checked_access(host, token)
     with _engine(files, jobs, typer.echo) as engine:
-        server = http.Server(http.make_application(engine, access), host=host, port=port)
+        server = http.Server(
+            http.make_application(engine, access), host=host, port=port,
+            on_listening=engine.prepare if prepare else None,
+        )  # fmt: skip
         terminal.note(f"{server.url}, requests at {server.url}/docs; Ctrl-C ends.")
         server.run()
 
@@ -172,7 +183,9 @@ def open_page(
     with _engine(files, jobs, terminal.note) as engine:
         application = http.make_application(engine, http.Access())
         add_page(application)
-        server = http.Server(application, host="127.0.0.1", port=window.port or 0)
+        server = http.Server(
+            application, host="127.0.0.1", port=window.port or 0, on_listening=engine.prepare
+        )
         address = server.url
         if first:
             address += f"/#{urlencode({'file': engine.files()[0].file, **first})}"
@@ -201,7 +214,9 @@ def _serve_assistant(files: list[Path] | None, jobs: int) -> None:
         serve_assistant(engine)
 
 
-def _serve_ros1(files: list[Path] | None, frames: _FrameOptions, jobs: int) -> None:
+def _serve_ros1(
+    files: list[Path] | None, frames: _FrameOptions, jobs: int, *, prepare: bool
+) -> None:
     """Answer as a node of ROS 1 until interrupted.
 
     Raises:
@@ -215,10 +230,14 @@ def _serve_ros1(files: list[Path] | None, frames: _FrameOptions, jobs: int) -> N
         Ros1Node(engine, names, max_age=frames.max_age) as node,
     ):
         terminal.note("the services of ROS 1 are at /tcs: `rosservice list`; Ctrl-C ends.")
+        if prepare:
+            engine.prepare()
         node.run()
 
 
-def _serve_ros2(files: list[Path] | None, frames: _FrameOptions, router: str, jobs: int) -> None:
+def _serve_ros2(
+    files: list[Path] | None, frames: _FrameOptions, router: str, jobs: int, *, prepare: bool
+) -> None:
     """Answer as a node of ROS 2 until interrupted.
 
     Raises:
@@ -243,6 +262,8 @@ def _serve_ros2(files: list[Path] | None, frames: _FrameOptions, router: str, jo
         terminal.note(
             f"the services of ROS 2 are at /tcs, domain {domain}, router {router}; Ctrl-C ends."
         )
+        if prepare:
+            engine.prepare()
         node.run()
 
 

@@ -26,10 +26,11 @@ from tcs.service.conversions import (
     utility_of,
 )
 from tcs.service.floor import floor_of, outcome_of
-from tcs.service.heavy_imports import import_heavy
+from tcs.service.heavy_imports import import_heavy, import_steps
 from tcs.service.jobs import Jobs, Progress
 from tcs.service.limits import Limits
 from tcs.service.postures import ScenePostures
+from tcs.service.preparation import Preparation
 from tcs.service.requests import (
     EvaluateRequest,
     ExplainRequest,
@@ -82,6 +83,7 @@ class Engine:
         self._postures = ScenePostures()
         self._work = SceneWork(self._files, self._sent, limits)
         self._set_work = SetWork(self._files, limits)
+        self._preparation: Preparation | None = None
 
     def __enter__(self) -> Self:
         """Return the engine."""
@@ -93,8 +95,20 @@ class Engine:
 
     def close(self) -> None:
         """Cancel the jobs and remove the temporary folder."""
+        if self._preparation is not None:
+            self._preparation.stop()
         self._jobs.close()
         self._stack.close()
+
+    def prepare(self) -> Preparation:
+        """Begin, in a thread, what the first job would wait for, and return it.
+
+        Drake is imported, and the kernel's machine code loaded; where there is none yet, it is not
+        compiled. Choosing from files needs neither, and far less memory.
+        """
+        if self._preparation is None:
+            self._preparation = Preparation((*import_steps(), self._work.prepare))
+        return self._preparation
 
     @property
     def limits(self) -> Limits:

@@ -6,6 +6,8 @@ Two threads that import the same large package for the first time may each find 
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 
 _LOCK = threading.Lock()
@@ -18,6 +20,15 @@ _MODULES = (
 
 def import_heavy() -> None:
     """Import what scenes are built and drawn with; returns at once the next time."""
+    for step in import_steps():
+        step()
+
+
+def import_steps() -> tuple[Callable[[], None], ...]:
+    """Return functions that do together what `import_heavy` does."""
+    return tuple(partial(_import, name) for name in _MODULES)
+
+
+def _import(name: str) -> None:
     with _LOCK:
-        for name in _MODULES:
-            import_module(name)
+        import_module(name)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import threading
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from tcs.errors import SelectionError
+from tcs.errors import SelectionError, ServiceError
+from tcs.files.paths import is_path
 from tcs.placement.store import ScoreFile
 from tcs.placement.tables import RefinedSet
 from tcs.service.conversions import (
@@ -33,7 +35,8 @@ if TYPE_CHECKING:
     from tcs.placement.scoring import LiveScorer
     from tcs.service.rescoring import Rescorer
 
-# Drake and the compiler are loaded by the first job: choosing from files does without.
+# Drake and the compiler are loaded by the first job, or by `prepare`: choosing from files does
+# without.
 
 
 class SceneWork:
@@ -44,6 +47,7 @@ class SceneWork:
         self._files, self._sent, self._limits = files, sent, limits
         self._scorer: tuple[str, LiveScorer] | None = None
         """The last live scorer and the request that it is for: building it takes a second."""
+        self._building = threading.Lock()
         self._rescorer: Rescorer | None = None
 
     def score(self, request: ScoreRequest, progress: Progress) -> dict[str, Any]:
@@ -70,20 +74,13 @@ class SceneWork:
             TcsError: As `tcs.LiveScorer`.
         """
         from tcs.model.scene import Observation, load_environment
-        from tcs.placement.scoring import LiveScorer
 
         if request.arms is not None:
             raise SelectionError("'arms' is not for an observed environment. Name the robot of it.")
-        task, environment, robot = self._models(request)
-        key = request.model_copy(update={"observed": {}, "frames": {}}).model_dump_json()
-        if self._scorer is None or self._scorer[0] != key:
-            self._scorer = None
-            scorer = LiveScorer(
-                task, environment, robot, on_compile=progress.compiling, **self._options(request)
-            )
-            self._scorer = (key, scorer)
+        _, environment, _ = self._models(request)
+        scorer = self._scorer_of(request, progress.compiling)
         progress(0, 1)
-        scored = self._scorer[1].score(
+        scored = scorer.score(
             Observation(
                 joints=observed_of(request.observed, load_environment(environment).observable_axes),
                 frames=request.frames,
@@ -92,6 +89,35 @@ class SceneWork:
         )
         progress(1, 1)
         return {**self._held(scored), "observation": scored.metadata["observation"]}
+
+    def prepare(self) -> None:
+        """Build the live scorer of the first file's task, or of the wheelchair; compile nothing.
+
+        Any live scorer loads the kernel's machine code; this one serves the likely first request.
+
+        Raises:
+            TcsError: As `tcs.LiveScorer`, and if there is no machine code yet.
+        """
+        names = {"task": "shaving"}
+        for entry in self._files.entries()[:1]:
+            metadata = self._files.loaded(entry.file).metadata
+            names = {key: metadata[key] for key in ("task", "environment", "robot")}
+        if not any(is_path(name) for name in names.values()):
+            self._scorer_of(ScoreHereRequest.model_validate(names), _without_compiling)
+
+    def _scorer_of(self, request: ScoreHereRequest, on_compile: Callable[[], None]) -> LiveScorer:
+        """Return the live scorer of a request: the last one where only the observation differs."""
+        from tcs.placement.scoring import LiveScorer
+
+        key = request.model_copy(update={"observed": {}, "frames": {}}).model_dump_json()
+        with self._building:
+            if self._scorer is None or self._scorer[0] != key:
+                self._scorer = None
+                scorer = LiveScorer(
+                    *self._models(request), on_compile=on_compile, **self._options(request)
+                )
+                self._scorer = (key, scorer)
+            return self._scorer[1]
 
     def rescore(self, request: RescoreRequest, progress: Progress) -> dict[str, Any]:
         """Return the summary of the task scored in the changed environment; as `score`.
@@ -223,3 +249,8 @@ class SceneWork:
             if not 0 <= h < size:
                 raise SelectionError(f"{h} is not a configuration; there are {size:,}, from 0.")
         return [table * size + h for h in indices]
+
+
+def _without_compiling() -> None:
+    """Raise `ServiceError`, where the kernel would be compiled."""
+    raise ServiceError("the kernel has no machine code yet; the first job compiles it.")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ipaddress
 import socket
 import threading
+from collections.abc import Callable
 from types import TracebackType
 from typing import Any, Self
 
@@ -56,16 +57,38 @@ def _is_loopback(host: str) -> bool:
         return False
 
 
+class _Listening(uvicorn.Server):
+    """A server that says when it listens."""
+
+    def __init__(self, config: uvicorn.Config, on_listening: Callable[[], object] | None) -> None:
+        super().__init__(config)
+        self._on_listening = on_listening
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Listen, and say so."""
+        await super().startup(sockets)
+        if self._on_listening is not None:
+            self._on_listening()
+
+
 class Server:
     """A server on a port of its own; `run` blocks, a `with` statement runs it in a thread."""
 
-    def __init__(self, application: Any, *, host: str, port: int) -> None:
+    def __init__(
+        self,
+        application: Any,
+        *,
+        host: str,
+        port: int,
+        on_listening: Callable[[], object] | None = None,
+    ) -> None:
         """Listen at a port.
 
         Args:
             application: The application.
             host: Name or address to listen at.
             port: The port; 0 for a free one.
+            on_listening: Called once requests are answered.
 
         Raises:
             OutputError: If the port cannot be used.
@@ -88,7 +111,7 @@ class Server:
             application, log_level="warning", access_log=False, server_header=False, lifespan="off",
             timeout_graceful_shutdown=_GRACE, timeout_keep_alive=_KEEP_ALIVE, ws="none",
         )  # fmt: skip
-        self._server = uvicorn.Server(config)
+        self._server = _Listening(config, on_listening)
         self._thread: threading.Thread | None = None
 
     def run(self, duration: float | None = None) -> None:
