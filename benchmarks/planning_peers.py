@@ -15,11 +15,6 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
-import ompl.base
-import ompl.geometric
-import ompl.util
-import roboplan.core
-import roboplan.rrt
 from numpy.typing import NDArray
 from planning_problems import FINGERS, Problem
 
@@ -53,6 +48,10 @@ def ompl_path(
         is_free: Whether a posture, shape (7,), touches nothing.
         seed: Seed of its random numbers.
     """
+    import ompl.base
+    import ompl.geometric
+    import ompl.util
+
     ompl.util.noOutputHandler()
     ompl.util.RNG.setSeed(seed + 1)
     space = ompl.base.RealVectorStateSpace(7)
@@ -88,6 +87,8 @@ class Roboplan:
 
     def __init__(self) -> None:
         """Load URDF, disabled pairs and collision meshes."""
+        import roboplan.core
+
         urdf = resolve_uri(f"package://{self.FOLDER}/urdf/panda.urdf", Path())
         folder = urdf.parents[1]
         description = roboplan.core.loadUrdfSceneDescriptionFromXml(
@@ -101,6 +102,9 @@ class Roboplan:
 
     def path(self, problem: Problem, seed: int) -> tuple[float, float]:
         """Return time [ms] and length [rad] of roboplan's path; it may refuse start or goal."""
+        import roboplan.core
+        import roboplan.rrt
+
         options = roboplan.rrt.RRTOptions(
             group_name=self.GROUP,
             max_nodes=1_000_000,
@@ -127,6 +131,8 @@ class Roboplan:
 
     @contextmanager
     def _obstacles(self, problem: Problem) -> Iterator[None]:
+        import roboplan.core
+
         names = [f"obstacle_{number}" for number in range(len(problem.obstacles))]
         for name, one in zip(names, problem.obstacles, strict=True):
             pose = np.eye(4, order="F")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+import sys
+import threading
 import time
 import webbrowser
 from collections.abc import Callable
@@ -19,6 +21,12 @@ from tcs.placement.tables import Reason
 
 _PAUSE = 0.01
 """Interval of polling the controls [s]: short against the 0.1 s that a change may take."""
+_OPENED: list[Meshcat] = []
+"""Every Meshcat that the main thread opened and that may be in use. Drake ends the process when a
+Meshcat is deleted by another thread than made it, as the garbage collector may do."""
+_UNUSED = 3
+"""Number of references to a Meshcat that only `_OPENED` holds, while they are counted: the list,
+the variable of the loop and the argument."""
 
 
 def open_meshcat(port: int | None = None) -> Meshcat:
@@ -30,17 +38,28 @@ def open_meshcat(port: int | None = None) -> Meshcat:
     Raises:
         OutputError: If the port is not free.
     """
+    is_main = threading.current_thread() is threading.main_thread()
+    if is_main:
+        _delete_unused()
     # The caller prints the address.
     log = logging.getLogger("drake")
     level = log.level
     log.setLevel(logging.WARNING)
     try:
-        return Meshcat(MeshcatParams(host="localhost", port=port, show_stats_plot=False))
+        meshcat = Meshcat(MeshcatParams(host="localhost", port=port, show_stats_plot=False))
     except RuntimeError as error:
         where = "a port from 7000 to 7099" if port is None else f"port {port}"
         raise OutputError(f"the viewer cannot listen at {where}. Give a free one.") from error
     finally:
         log.setLevel(level)
+    if is_main:
+        _OPENED.append(meshcat)
+    return meshcat
+
+
+def _delete_unused() -> None:
+    """Delete what `open_meshcat` opened in the main thread and nothing else refers to."""
+    _OPENED[:] = [one for one in _OPENED if sys.getrefcount(one) > _UNUSED]
 
 
 def stay_open(

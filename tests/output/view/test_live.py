@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -139,3 +141,33 @@ def test_run_ends_after_its_duration(viewer):
 def test_a_port_that_is_taken_is_reported(shared_meshcat):
     with pytest.raises(OutputError, match=f"port {shared_meshcat.port()}"):
         open_meshcat(shared_meshcat.port())
+
+
+COLLECTED_BY_A_THREAD = """
+import gc, threading
+from tcs.output.view import open_meshcat
+gc.disable()
+cycle = [open_meshcat()]
+cycle.append(cycle)
+del cycle
+thread = threading.Thread(target=gc.collect)
+thread.start()
+thread.join()
+print("alive")
+"""
+
+
+def test_a_thread_that_collects_garbage_does_not_end_the_process():
+    ran = subprocess.run(
+        [sys.executable, "-c", COLLECTED_BY_A_THREAD], capture_output=True, text=True, check=False
+    )
+    assert (ran.returncode, ran.stdout) == (0, "alive\n"), ran.stderr
+
+
+def test_a_port_is_free_again_when_its_viewer_is_not_used_any_more():
+    meshcat = open_meshcat()
+    port = meshcat.port()
+    with pytest.raises(OutputError, match="cannot listen"):
+        open_meshcat(port)
+    del meshcat
+    assert open_meshcat(port).port() == port
