@@ -28,8 +28,9 @@ from tcs.placement.robustness.trials import ArmTrials, Progress, Trials
 CHUNK = 500
 """People whose scenes are held in memory together: with errors, some ten megabytes for each state
 of the environment."""
-BATCH = 10
-"""People that a thread evaluates at a time: some tens of milliseconds of work."""
+BATCH = 25
+"""People that a thread evaluates at a time: enough that stretching their shapes together pays, and
+an even load."""
 
 Reasons = NDArray[np.uint8]
 
