@@ -12,18 +12,8 @@ import pytest
 
 import tcs
 from tcs.placement.robustness import success_summary
+from tests.beside import BESIDE
 from tests.placement.store.example import score_file
-
-BESIDE = """
-based_on: wheelchair
-name: beside
-title: A few places beside the wheelchair
-grid:
-  base_x: {unit: m, start: 0.6, step: 0.2, count: 4}
-  base_y: {unit: m, start: -0.95, step: 1.7, count: 2}
-  base_yaw: {unit: deg, start: 90, step: 90, count: 2}
-  torso: {unit: m, start: 0.15, step: 0.15, count: 2}
-"""
 
 
 @pytest.fixture(scope="module")

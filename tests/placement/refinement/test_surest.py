@@ -15,17 +15,8 @@ from tcs.placement.refinement.staged import StagedSamples, best_pairs
 from tcs.placement.refinement.surest import SurestSearch, surest_pairs
 from tcs.placement.robustness import PerturbedPoints, Trials
 from tcs.placement.tables import Points
+from tests.beside import BESIDE
 
-BESIDE = """
-based_on: wheelchair
-name: beside
-title: A few places beside the wheelchair
-grid:
-  base_x: {unit: m, start: 0.6, step: 0.2, count: 4}
-  base_y: {unit: m, start: -0.95, step: 1.7, count: 2}
-  base_yaw: {unit: deg, start: 90, step: 90, count: 2}
-  torso: {unit: m, start: 0.15, step: 0.15, count: 2}
-"""
 SAMPLES = 40
 
 
