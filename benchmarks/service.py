@@ -5,7 +5,8 @@ Usage: python benchmarks/service.py FILE [--clients 50] [--requests 200] [--paus
 FILE is a score file made by `tcs score`. The server is a process of its own; the clients share this
 process and write HTTP by hand, so that they take little of the processor. With `--pause`, a client
 waits between its requests on average so long [s]; without, it sends the next at once, and the
-latency is then the number of clients divided by the throughput.
+latency is then the number of clients divided by the throughput. Measuring begins once the server
+has prepared what its first job needs.
 """
 
 from __future__ import annotations
@@ -28,6 +29,8 @@ from tcs.placement.store import ScoreFile, load_scores
 
 MALFORMED = 1000
 ALONE = 300
+BETWEEN, IDLE = 2.0, 0.02
+"""Interval between two looks at the server [s], and the fraction of it that counts as idle."""
 
 
 def main() -> int:
@@ -52,6 +55,7 @@ def main() -> int:
         digest = server.stdout.readline().split()[0]
         port = int(server.stderr.readline().split("127.0.0.1:")[1].split(",")[0])
         asked = Asked(load_scores(options.file), digest, options.seed)
+        wait_until_idle(server.pid)
         asyncio.run(measured(port, asked, options, server.pid))
         failed = server.poll() is not None
     finally:
@@ -168,6 +172,14 @@ async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, bod
     )
     await reader.readexactly(length)
     return int(head.split(b" ", 2)[1])
+
+
+def wait_until_idle(pid: int) -> None:
+    """Wait until a server has prepared what its first job needs, so that only requests are left."""
+    before = -1.0
+    while processor_time(pid) - before > IDLE * BETWEEN:
+        before = processor_time(pid)
+        time.sleep(BETWEEN)
 
 
 def processor_time(pid: int) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 
 from tcs.errors import SelectionError
 from tcs.model.grid import Axis, InitialConfiguration
@@ -18,6 +19,12 @@ from tcs.service.requests import (
     SelectRequest,
     TravelCosts,
 )
+
+_NO_CONSTRAINTS = Constraints()
+KEPT_WEIGHTS = 64
+"""Most weights that are kept: checking them takes as long as a tenth of a selection."""
+_travel = lru_cache(KEPT_WEIGHTS)(TravelWeights)
+_utility = lru_cache(KEPT_WEIGHTS)(UtilityWeights)
 
 
 def settings_of(values: Mapping[str, float], where: str) -> dict[str, float]:
@@ -104,6 +111,8 @@ def constraints_of(request: Limited, prefer: Sequence[str] = ()) -> Constraints:
     Raises:
         TcsError: If one is not of its form.
     """
+    if not (request.only or request.keep or request.forbid or request.blocked or prefer):
+        return _NO_CONSTRAINTS
     return Constraints(
         only=tuple(request.only),
         keep=tuple(request.keep),
@@ -133,7 +142,7 @@ def travel_of(request: TravelCosts) -> TravelWeights:
     Raises:
         SelectionError: If a weight is invalid.
     """
-    return TravelWeights(
+    return _travel(
         metre=request.metre_weight,
         turn=request.turn_weight,
         torso=request.torso_weight,
@@ -148,7 +157,7 @@ def utility_of(request: SelectRequest) -> UtilityWeights:
     Raises:
         SelectionError: If a weight is invalid.
     """
-    return UtilityWeights(
+    return _utility(
         reachability=request.alpha,
         manipulability=request.beta,
         travel=request.gamma,

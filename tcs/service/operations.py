@@ -33,6 +33,8 @@ class Operation:
     """Model of the body."""
     is_job: bool
     """Whether it is queued as a job."""
+    takes_turns: bool = False
+    """Whether requests about one score file are answered one after the other."""
 
     @property
     def path(self) -> str:
@@ -46,10 +48,10 @@ class Operation:
 
 
 OPERATIONS = (
-    Operation("select", SelectRequest, is_job=False),
-    Operation("explain", ExplainRequest, is_job=False),
-    Operation("floor", FloorRequest, is_job=False),
-    Operation("outcome", OutcomeRequest, is_job=False),
+    Operation("select", SelectRequest, is_job=False, takes_turns=True),
+    Operation("explain", ExplainRequest, is_job=False, takes_turns=True),
+    Operation("floor", FloorRequest, is_job=False, takes_turns=True),
+    Operation("outcome", OutcomeRequest, is_job=False, takes_turns=True),
     Operation("posture", PostureRequest, is_job=False),
     Operation("score", ScoreRequest, is_job=True),
     Operation("score-here", ScoreHereRequest, is_job=True),

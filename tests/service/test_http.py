@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import random
 import socket
+import threading
+import time
 
 import httpx
 import pytest
-from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from tcs.errors import OutputError, ServiceError
 from tcs.placement.store import save_scores
 from tcs.service import Engine, Limits, SelectRequest
 from tcs.service.client import Client
 from tcs.service.http import Access, Server, checked_access, make_application
+from tcs.service.http.file_queues import QUEUES, FileQueues
+from tcs.service.http.protocol import MOST_HEAD_BYTES, BoundedProtocol
 from tests.placement.store.example import score_file
 
 TOKEN = "a-token-of-24-characters"
@@ -83,6 +87,42 @@ def test_sizes_and_times_are_limited(http, server, valid):
         assert b"408" in slow.recv(4096)
 
 
+def test_headers_without_an_end_are_refused(server):
+    address = httpx.URL(server.url)
+    line = b"X-More: " + b"x" * 1000 + b"\r\n"
+    with socket.create_connection((address.host, address.port), timeout=20) as endless:
+        endless.sendall(b"GET /v1 HTTP/1.1\r\nHost: 127.0.0.1\r\n")
+        with pytest.raises(ConnectionError):
+            endless.sendall(line * (100 * MOST_HEAD_BYTES // len(line)))
+    with socket.create_connection((address.host, address.port), timeout=20) as whole:
+        for _ in range(3):
+            # One connection may send any number of requests below the limit.
+            whole.sendall(b"GET /v1 HTTP/1.1\r\nHost: 127.0.0.1\r\n" + 40 * line + b"\r\n")
+            assert b"200 OK" in whole.recv(65536)
+
+
+def test_requests_about_a_file_are_answered_in_their_order():
+    answered, threads = [], set()
+
+    def answer(file: str, number: int) -> tuple[str, int]:
+        time.sleep(0.001 * (number % 3))
+        threads.add(threading.get_ident())
+        answered.append((file, number))
+        return file, number
+
+    async def ask() -> list[tuple[str, int]]:
+        queues = FileQueues()
+        sent = [(f"{file:064x}", number) for number in range(20) for file in range(6)]
+        waiting = [queues.run(one[0], lambda one=one: answer(*one)) for one in sent]
+        assert await asyncio.gather(*waiting) == sent
+        return sent
+
+    sent = asyncio.run(ask())
+    for file in {one for one, _ in sent}:
+        assert [number for one, number in answered if one == file] == list(range(20))
+    assert len(threads) <= QUEUES
+
+
 def test_too_many_requests_at_once_are_refused(engine, monkeypatch):
     few = Limits(requests_at_once=0)
     monkeypatch.setattr(Engine, "limits", few)
@@ -122,14 +162,14 @@ def test_only_this_machine_without_a_token():
 
 def test_answers_are_sent_at_once(server, monkeypatch):
     # Otherwise the body of an answer waits until the client has acknowledged its head, some 40 ms.
-    at_once, connection_made = [], H11Protocol.connection_made
+    at_once, connection_made = [], BoundedProtocol.connection_made
 
     def connected(protocol, transport):
         connection = transport.get_extra_info("socket")
         at_once.append(connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY))
         connection_made(protocol, transport)
 
-    monkeypatch.setattr(H11Protocol, "connection_made", connected)
+    monkeypatch.setattr(BoundedProtocol, "connection_made", connected)
     httpx.get(f"{server.url}/openapi.json")
     assert at_once
     assert all(at_once)

@@ -7,6 +7,7 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -24,7 +25,7 @@ MAX_CONFIGURATIONS = 100_000_000
 score file has two billion reasons, the most that are read (`tcs.files.compression.MAX_BYTES`)."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Grid:
     """Every combination of the values of its axes.
 
@@ -94,23 +95,23 @@ class Grid:
                 f"{MAX_CONFIGURATIONS:,} are allowed. Take larger steps or fewer values."
             )
 
-    @property
+    @cached_property
     def shape(self) -> tuple[int, ...]:
         """Number of arms, if there are several, and number of values of each axis."""
         counts = tuple(axis.count for axis in self.axes)
         return (len(self.arms), *counts) if self.arms else counts
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Number of configurations."""
         return math.prod(self.shape)
 
-    @property
+    @cached_property
     def arm_size(self) -> int:
         """Number of configurations of each arm."""
         return math.prod(axis.count for axis in self.axes)
 
-    @property
+    @cached_property
     def state_size(self) -> int:
         """Number of configurations of each arm in each state of the environment."""
         return math.prod(axis.count for axis in self.axes[-len(ROBOT_AXES) :])
@@ -139,7 +140,7 @@ class Grid:
         """
         return np.asarray(self._checked(flat) % self.arm_size // self.state_size)
 
-    @property
+    @cached_property
     def environment_axes(self) -> tuple[Axis, ...]:
         """The axes that move the environment, e.g. the bed; they come first."""
         return self.axes[: -len(ROBOT_AXES)]

@@ -20,6 +20,7 @@ BoolArray = NDArray[np.bool_]
 
 KEY = "constraints"
 """Entry of the metadata of a score file."""
+_NO_CONSTRAINTS = Constraints()
 
 
 def excluded_configurations(
@@ -91,6 +92,8 @@ def recorded_constraints(metadata: Mapping[str, Any]) -> Constraints:
         StoreError: If they are not in the form of `constraints_entry`.
     """
     entry = metadata.get(KEY, {})
+    if entry == {} and not metadata.get("only"):
+        return _NO_CONSTRAINTS
     where = f"metadata '{KEY}'"
     if not isinstance(entry, dict):
         raise StoreError(f"{where} must be a mapping.")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
 from functools import partial
 from typing import Any
 
@@ -11,11 +11,13 @@ import anyio
 import anyio.to_thread
 from fastapi import FastAPI, Request, Response
 from fastapi.responses import HTMLResponse, StreamingResponse
+from fastapi.routing import APIRoute
 
 from tcs.errors import BusyError, DataFileError, TcsError
 from tcs.files.documents import checked
 from tcs.service.engine import Engine
 from tcs.service.http import description
+from tcs.service.http.file_queues import FileQueues
 from tcs.service.http.guard import Access, Guard
 from tcs.service.http.problems import problem, problem_of
 from tcs.service.operations import OPERATIONS, Operation
@@ -29,7 +31,20 @@ _ABOUT = (
 )
 _BEAT = 10.0
 """Longest time between two events of a stream [s]."""
-_FILE = "application/octet-stream"
+_FILE, _JSON = "application/octet-stream", "application/json"
+
+
+class PlainRoute(APIRoute):
+    """A route whose function takes the request and returns the response.
+
+    FastAPI's search for the values of parameters, which such a function has none of, takes as long
+    as a third of a selection.
+    """
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """Return the function itself."""
+        endpoint: Callable[[Request], Coroutine[Any, Any, Response]] = self.endpoint
+        return endpoint
 
 
 def make_application(engine: Engine, access: Access) -> FastAPI:
@@ -46,8 +61,9 @@ def make_application(engine: Engine, access: Access) -> FastAPI:
     app.add_exception_handler(TcsError, _on_error)
     app.add_exception_handler(404, _on_unknown_path)
     app.add_exception_handler(405, _on_unknown_path)
+    queues = FileQueues()
     for operation in OPERATIONS:
-        _add_operation(app, engine, operation)
+        _add_operation(app, engine, operation, queues)
     _add_files(app, engine)
     _add_jobs(app, engine)
     _add_description(app, engine)
@@ -64,7 +80,7 @@ async def _on_unknown_path(request: Request, _error: Exception) -> Response:
     return problem(404, "NotFoundError", f"there is no {request.method} {path}. See /docs.")
 
 
-def _add_operation(app: FastAPI, engine: Engine, operation: Operation) -> None:
+def _add_operation(app: FastAPI, engine: Engine, operation: Operation, queues: FileQueues) -> None:
     """Add a request with a body of JSON."""
     answer: Callable[[Any], Any] = engine.submit
     if not operation.is_job:
@@ -72,14 +88,19 @@ def _add_operation(app: FastAPI, engine: Engine, operation: Operation) -> None:
 
     async def endpoint(request: Request) -> Response:
         content = await _json_of(request)
-        checked_request = checked(content, operation.request, "request", DataFileError)
+        checked_request: Any = checked(content, operation.request, "request", DataFileError)
+        if operation.takes_turns:
+            text = await queues.run(checked_request.file, lambda: _text(answer(checked_request)))
+            return Response(text, media_type=_JSON)
         result = await anyio.to_thread.run_sync(answer, checked_request)
         if isinstance(result, JobStatus):
             return _json(result.model_dump(), status=202)
         return _json(result)
 
-    _route(
-        app, "POST", operation.path, endpoint, operation.summary, name=operation.name,
+    app.router.add_api_route(
+        operation.path, endpoint, methods=["POST"], summary=operation.summary,
+        response_model=None, name=operation.name, route_class_override=PlainRoute,
+        responses={422: description.problem_response("The request is refused.")},
         openapi_extra={"requestBody": description.body_of(operation.request.__name__)},
     )  # fmt: skip
 
@@ -231,7 +252,7 @@ async def _json_of(request: Request) -> dict[str, Any]:
         DataFileError: If it is not one.
     """
     media_type = request.headers.get("content-type", "").partition(";")[0].strip().lower()
-    if media_type != "application/json":
+    if media_type != _JSON:
         raise DataFileError("request: the content type must be application/json.")
     try:
         content = json.loads(await request.body())
@@ -244,6 +265,8 @@ async def _json_of(request: Request) -> dict[str, Any]:
 
 
 def _json(content: Any, status: int = 200) -> Response:
-    return Response(
-        json.dumps(content, allow_nan=False), status_code=status, media_type="application/json"
-    )
+    return Response(_text(content), status_code=status, media_type=_JSON)
+
+
+def _text(content: Any) -> str:
+    return json.dumps(content, allow_nan=False)

@@ -136,7 +136,8 @@ def _bounded(receive: Receive, limits: Limits, scope: Message) -> Receive:
             # Only the end of the connection may follow, at any time.
             return await receive()
         try:
-            message = await asyncio.wait_for(receive(), end - loop.time())
+            async with asyncio.timeout_at(end):
+                message = await receive()
         except TimeoutError:
             text = f"the content of the request took longer than {limits.request_seconds:g} s."
             raise TooSlowError(text) from None

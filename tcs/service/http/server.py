@@ -13,6 +13,7 @@ import uvicorn
 
 from tcs.errors import OutputError, ServiceError
 from tcs.service.http.guard import Access
+from tcs.service.http.protocol import BoundedProtocol
 
 _LEAST_TOKEN = 16
 """Fewest characters of a token."""
@@ -110,6 +111,7 @@ class Server:
         config = uvicorn.Config(
             application, log_level="warning", access_log=False, server_header=False, lifespan="off",
             timeout_graceful_shutdown=_GRACE, timeout_keep_alive=_KEEP_ALIVE, ws="none",
+            http=BoundedProtocol,
         )  # fmt: skip
         self._server = _Listening(config, on_listening)
         self._thread: threading.Thread | None = None
