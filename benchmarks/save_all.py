@@ -94,6 +94,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "scale": (),
     "faults": (),
     "kills": (),
+    "fault_conditions": (),
     "edges": (),
     "fuzz": ("--mutants", "5000"),
     "fuzz_options": (),

@@ -8,6 +8,13 @@ from __future__ import annotations
 
 import sys
 
+from tcs.files.memory import (
+    START,
+    WANT_OF_MEMORY,
+    check_room,
+    guard_imports,
+    is_for_want_of_memory,
+)
 from tcs.interrupts import (
     raise_if_interrupted,
     remember_interrupts,
@@ -17,15 +24,22 @@ from tcs.interrupts import (
 
 
 def main() -> None:
-    """Run the command line; an interrupt ends it in one line even while modules are imported."""
+    """Run the command line.
+
+    An interrupt, or too little memory, ends it in one line even while modules are imported.
+    """
     with remember_interrupts(to_the_end=True):
         try:
+            check_room(START)
+            guard_imports()
             # The commands import some hundred modules.
             from tcs.cli.app import app
 
             raise_if_interrupted()
             app(prog_name="tcs")
         except (Exception, KeyboardInterrupt) as error:
+            if is_for_want_of_memory(error):
+                sys.exit(f"tcs: {WANT_OF_MEMORY}")
             if not isinstance(error, KeyboardInterrupt) and not was_interrupted():
                 raise
             sys.exit(report_interrupt())

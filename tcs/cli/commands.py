@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -11,7 +10,7 @@ import typer
 from typer.core import TyperGroup
 
 from tcs.errors import TcsError
-from tcs.files.memory import guard_imports, is_limited
+from tcs.files.memory import WANT_OF_MEMORY, is_for_want_of_memory
 from tcs.interrupts import remember_interrupts, report_interrupt, was_interrupted
 from tcs.output.terminal import console
 
@@ -38,28 +37,6 @@ class Commands(TyperGroup):
             return super().invoke(ctx)
 
 
-def is_for_want_of_memory(error: BaseException) -> bool:
-    """Return whether an exception says that memory, or the space of addresses, is used up."""
-    return (
-        isinstance(error, MemoryError)
-        # Libraries that find no address space when they are loaded do not say so.
-        or (isinstance(error, ImportError | OSError) and is_limited() and is_of_loading(error))
-        or (isinstance(error, RuntimeError) and str(error) == "can't start new thread")
-        # Compiled modules that find no memory while they are imported.
-        or (isinstance(error, SystemError) and str(error) == "error return without exception set")
-    )
-
-
-def is_of_loading(error: ImportError | OSError) -> bool:
-    """Return whether a shared library, or a compiled module, could not be loaded."""
-    texts = ("initialization failed", "shared object", "failed to map", "libllvmlite")
-    return (
-        error.errno == errno.ENOMEM
-        if isinstance(error, OSError) and error.errno
-        else any(text in str(error) for text in texts)
-    )
-
-
 def _refuse_empty(words: list[str]) -> None:
     """Refuse empty texts on the command line, such as an unset variable of a shell script.
 
@@ -79,7 +56,6 @@ def _refuse_empty(words: list[str]) -> None:
 
 @contextmanager
 def _ended_in_one_line() -> Iterator[None]:
-    guard_imports()
     with remember_interrupts():
         try:
             yield
@@ -90,10 +66,7 @@ def _ended_in_one_line() -> Iterator[None]:
             raise
         except (Exception, KeyboardInterrupt) as error:
             if is_for_want_of_memory(error):
-                console.note(
-                    "the memory does not suffice. Score a coarser grid or fewer axes, or use a "
-                    "machine with more; `tcs score --dry-run` tells how much scores need."
-                )
+                console.note(WANT_OF_MEMORY)
                 raise typer.Exit(1) from None
             if not isinstance(error, KeyboardInterrupt) and not was_interrupted():
                 raise

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import resource
 import sys
@@ -18,8 +19,21 @@ LIBRARIES = {
 }
 """Modules that, loaded without enough room, wait for ever or end the process, and the address space
 that they take at most, with what they load [bytes]."""
-CODE = 100 * _MEGABYTE
-"""Address space that loading or compiling machine code takes at most, with its threads [bytes]."""
+START = (100 + 40 * min(os.cpu_count() or 1, 64)) * _MEGABYTE
+"""Address space that Python, NumPy, whose BLAS has a buffer and a stack for each core, and the
+modules of the commands take at most [bytes]."""
+CODE = 150 * _MEGABYTE
+"""Address space that loading the machine code of one command takes at most [bytes]."""
+COMPILING = 450 * _MEGABYTE
+"""Address space that compiling the scoring kernel and loading it takes at most [bytes]."""
+THREAD = 140 * _MEGABYTE
+"""Address space that a thread takes: its stack, and the heap of its own that the C library reserves
+for it [bytes]."""
+WANT_OF_MEMORY = (
+    "the memory does not suffice. Score a coarser grid or fewer axes, or use a machine with more; "
+    "`tcs score --dry-run` tells how much scores need."
+)
+"""What a command prints that ends so."""
 
 
 def is_limited() -> bool:
@@ -70,3 +84,25 @@ def check_room(needed: int = CODE) -> None:
     left = resource.getrlimit(resource.RLIMIT_AS)[0] - pages * os.sysconf("SC_PAGE_SIZE")
     if left < needed:
         raise MemoryError(f"{left:,} bytes of address space are left; {needed:,} are needed")
+
+
+def is_for_want_of_memory(error: BaseException) -> bool:
+    """Return whether an exception says that memory, or the space of addresses, is used up."""
+    return (
+        isinstance(error, MemoryError)
+        # Libraries that find no address space when they are loaded do not say so.
+        or (isinstance(error, ImportError | OSError) and is_limited() and is_of_loading(error))
+        or (isinstance(error, RuntimeError) and str(error) == "can't start new thread")
+        # Compiled modules that find no memory while they are imported.
+        or (isinstance(error, SystemError) and str(error) == "error return without exception set")
+    )
+
+
+def is_of_loading(error: ImportError | OSError) -> bool:
+    """Return whether a shared library, or a compiled module, could not be loaded."""
+    texts = ("initialization failed", "shared object", "failed to map", "libllvmlite")
+    return (
+        error.errno == errno.ENOMEM
+        if isinstance(error, OSError) and error.errno
+        else any(text in str(error) for text in texts)
+    )

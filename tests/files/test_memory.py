@@ -3,11 +3,13 @@
 import resource
 import subprocess
 import sys
+from importlib import import_module
+from types import SimpleNamespace
 
 import pytest
 
-from tcs.cli.commands import is_for_want_of_memory
 from tcs.files import memory
+from tcs.files.memory import is_for_want_of_memory
 
 MEGABYTE = 1024**2
 
@@ -29,14 +31,36 @@ def test_what_fails_to_load_is_told_as_want_of_memory_only_with_a_limit(monkeypa
         OSError(12, "Cannot allocate memory"),
     ]
     assert not any(map(is_for_want_of_memory, errors))
-    monkeypatch.setattr("tcs.cli.commands.is_limited", lambda: True)
+    monkeypatch.setattr("tcs.files.memory.is_limited", lambda: True)
     assert all(map(is_for_want_of_memory, errors))
     assert not is_for_want_of_memory(ImportError("No module named 'yaml'"))
     assert not is_for_want_of_memory(FileNotFoundError(2, "No such file", "libllvmlite.so"))
 
 
-# From too little for the BLAS of SciPy, which would ask for ever, to too little for Drake.
-@pytest.mark.parametrize("megabytes", [400, 600])
+@pytest.mark.parametrize(
+    ("is_kept", "needed"),
+    [(True, memory.CODE), (False, memory.COMPILING)],
+    ids=["kept", "compiled"],
+)
+def test_compiling_needs_more_room_than_loading_machine_code(is_kept, needed, monkeypatch):
+    # The package's attribute of this name is the function.
+    sweep = import_module("tcs.placement.scoring.sweep")
+    asked = []
+
+    def refuse(room):
+        asked.append(room)
+        raise MemoryError
+
+    monkeypatch.setattr(sweep, "is_compiled", lambda _: is_kept)
+    monkeypatch.setattr(sweep, "check_room", refuse)
+    with pytest.raises(MemoryError):
+        sweep.warm_up(SimpleNamespace(joints=6))
+    assert asked == [needed]
+
+
+# From too little for NumPy and the commands, and for the BLAS of SciPy, which would ask for ever,
+# to too little for Drake.
+@pytest.mark.parametrize("megabytes", [60, 100, 400, 600])
 def test_a_command_ends_in_one_line(megabytes, tmp_path):
     done = subprocess.run(
         [sys.executable, "-m", "tcs", "score", "shaving", "--out", str(tmp_path / "out.tcs")],

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tcs.errors import TcsError
 from tcs.files.blocks import BlockFolder
 from tcs.files.mapped import chunks, large_zeros, release
-from tcs.files.memory import check_room
+from tcs.files.memory import CODE, COMPILING, check_room
 from tcs.kernel.analytic.solver import is_outside
 from tcs.kernel.cache import is_compiled
 from tcs.kernel.dexterity import DEFAULT_MEASURE
@@ -189,9 +189,10 @@ def warm_up(
     if approaches is not None:
         check_closed_form(problem)
         entries.append(ENTRY)
-    if on_compile is not None and not all(map(is_compiled, entries)):
+    is_kept = all(map(is_compiled, entries))
+    if on_compile is not None and not is_kept:
         on_compile()
-    check_room()
+    check_room(CODE if is_kept else COMPILING)
     begun = time.perf_counter()
     Work(problem, gripper_contacts(problem)).warm_up()
     seconds = time.perf_counter() - begun

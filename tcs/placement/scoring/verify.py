@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tcs.errors import TcsError
 from tcs.files.mapped import large_zeros
-from tcs.files.memory import check_room
+from tcs.files.memory import CODE, THREAD, check_room
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scans
 from tcs.placement.scoring.drake_check import (
@@ -198,8 +198,8 @@ def verify(
             on_progress(next(count), total)
 
     findings = checker.stored(reached, step) + checker.refined(of_refined, step)
-    # The machine code of the scans is loaded now.
-    check_room()
+    # The threads load the machine code of the scans.
+    check_room(CODE + jobs * THREAD)
     begun = time.perf_counter()
     hits = {r: checker.hits(part, step) for r, part in unreached.items()}
     scan_seconds = time.perf_counter() - begun
