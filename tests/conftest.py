@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import signal
 from pathlib import Path
 
@@ -11,7 +12,10 @@ import pytest
 from tcs.model.grid import Grid
 from tcs.model.robots import load_robot
 from tcs.model.scene import Scene, SceneSpec, load_environment, lower
+from tcs.model.scene import scene as scene_module
+from tcs.model.scene.plant import build_plant
 from tcs.model.tasks import load_task
+from tcs.motion import recheck
 
 HERE = Path(__file__).parent
 FIRST = (
@@ -32,9 +36,31 @@ def pytest_collection_modifyitems(items):
 
 @pytest.fixture(autouse=True, scope="session")
 def _interruptible():
-    """Restore Ctrl-C, which some tests send and which shells make background jobs ignore."""
+    """Restore signals that some tests send: shells make background jobs ignore Ctrl-C, and `nohup`
+    makes its command ignore the end of a terminal."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+    if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _plants_are_built_once():
+    """Share finalized plants, which nothing changes, between the scenes of one specification.
+
+    A plant takes most of the time that a scene does; each scene has a context of its own.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(scene_module, "build_plant", functools.lru_cache(maxsize=16)(build_plant))
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _coarse_recheck():
+    """Postures of the re-check are 4 cm apart: Drake takes ten milliseconds for each."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(recheck, "LARGEST_STEP", 0.04)
+        yield
 
 
 @pytest.fixture(scope="session")

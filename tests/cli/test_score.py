@@ -227,7 +227,8 @@ def test_other_models_are_refused(tcs_command, corner_file, tmp_path, verb):
 @pytest.mark.parametrize("verb", ["map", "picture"])
 def test_pictures_are_written(tcs_command, corner_file, tmp_path, verb):
     path = tmp_path / "p.png"
-    for here in ((), ("--here", 1.6, -1.4, 90)):
+    # A picture of the scene takes seconds.
+    for here in ((), ("--here", 1.6, -1.4, 90))[verb == "picture" :]:
         ran = tcs_command(verb, corner_file, "--out", path, *here, "--json")
         assert (ran.code, ran.err) == (0, "")
         assert ran.json["file"] == str(path)

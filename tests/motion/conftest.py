@@ -9,17 +9,8 @@ from typer.testing import CliRunner
 import tcs
 from tcs.cli.app import app
 from tcs.files.paths import data_folder
-from tcs.motion import recheck
 
 CONFIGURATION = ("base_x = 0.6 m", "base_y = -0.9 m", "base_yaw = 45 deg", "torso = 0.3 m")
-
-
-@pytest.fixture(autouse=True, scope="session")
-def _coarse_recheck():
-    """Postures of the re-check are 4 cm apart: Drake takes ten milliseconds for each."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(recheck, "LARGEST_STEP", 0.04)
-        yield
 
 
 @pytest.fixture(scope="session")

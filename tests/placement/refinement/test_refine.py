@@ -447,9 +447,9 @@ def test_a_refined_set_is_evaluated_like_one_of_the_grid(scored, refined):
         evaluate_refined(scored)
 
 
-def of_two_goals(stop, index, number, goals, order, on_goal):
+def of_two_goals(stop, index, number, goals, *how):
     """Plan two goals of a stop, and hand the others back."""
-    planned, found = plan_stop(stop, index, number, goals[:2], order, on_goal)
+    planned, found = plan_stop(stop, index, number, goals[:2], *how)
     left = tuple(GoalResult(goal, None, False, "not asked for") for goal in goals[2:])
     return planned, (*found, *left)
 
