@@ -28,15 +28,23 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
 from tcs.errors import TcsError
 from tcs.files.paths import data_folder
-from tcs.model.robots import RobotFile, load_robot, read_primitives, write_primitives
+from tcs.model.robots import (
+    Primitive,
+    RobotFile,
+    load_robot,
+    read_primitives,
+    write_primitives,
+)
 from tcs.model.robots.fitting import (
     Part,
     Spots,
     Target,
+    enclose_axis,
     fit_robot,
     refit,
     refit_parts,
@@ -76,7 +84,7 @@ def main() -> int:
         elif "--tighten" in sys.argv:
             splits = {body: int(text) for body, text in more} or splits_of(robot)
             shapes = read_primitives(Path(robot.primitives))
-            shapes = tightened(robot, shapes, splits, spots_of(robot))
+            shapes = tightened(robot, shapes, splits, spots_of(robot), rounds_of(robot))
             write_primitives(Path(robot.primitives), shapes)
             print_blocked(robot)
         elif more:
@@ -97,10 +105,10 @@ def rewrite_primitives(robot: RobotFile) -> None:
     fits = fit_robot(
         robot, lambda done, total: print(f"{done}/{total}", file=sys.stderr), chosen_fits(robot)
     )
-    shapes = [p for f in fits for p in f.fit.primitives]
-    shapes = refit_parts(robot, shapes, parts_of(robot))
-    shapes = tightened(robot, shapes, splits_of(robot), spots_of(robot))
-    write_primitives(Path(robot.primitives), shapes)
+    fitted = [p for f in fits for p in f.fit.primitives]
+    shapes = refit_parts(robot, fitted, parts_of(robot))
+    tight = tightened(robot, shapes, splits_of(robot), spots_of(robot), rounds_of(robot))
+    write_primitives(Path(robot.primitives), tight)
     print("| body | shapes | hull [l] | union [l] | excess |")
     print("|---|---|---|---|---|")
     for found in fits:
@@ -149,6 +157,15 @@ def spots_of(robot: RobotFile) -> dict[str, Spots]:
         body: [(float(x), float(y), float(z), float(r)) for x, y, z, r in fit["spots"]]
         for body, fit in _fits(robot).items()
         if isinstance(fit, dict) and "spots" in fit
+    }
+
+
+def rounds_of(robot: RobotFile) -> dict[str, list[Primitive]]:
+    """Return the capsules that FITS adds along round bodies before they are tightened."""
+    return {
+        body: [enclose_axis(body, np.array(c[:3]), np.array(c[3:6]), c[6]) for c in fit["capsules"]]
+        for body, fit in _fits(robot).items()
+        if isinstance(fit, dict) and "capsules" in fit
     }
 
 

@@ -134,8 +134,6 @@ def _goals_on(
                 quaternion=X_LG.rotation().ToQuaternion().wxyz(),
                 weight=surface.weight / chosen.size,
                 free=surface.free,
-                arm=surface.arm,
-                tool=surface.tool,
                 approach=surface.approach,
                 retreat=surface.retreat,
             )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -27,8 +27,7 @@ from tcs.placement.constraints import (
 from tcs.placement.scoring.approaches import approach_entry, approach_lines
 from tcs.placement.scoring.arms import score_arms
 from tcs.placement.scoring.engines import ScoringEngine
-from tcs.placement.scoring.hands import check_arms_are_free, score_hands
-from tcs.placement.scoring.job import Job, JobOptions, data_references, load_job, load_jobs
+from tcs.placement.scoring.job import Job, data_references, load_job
 from tcs.placement.scoring.person import person_entry
 from tcs.placement.scoring.robot_shapes import robot_shapes
 from tcs.placement.scoring.self_contact import prevailing_self_contact
@@ -65,7 +64,7 @@ class ScoringSetup:
     """Which sets are kept."""
     measure: str
     """Name of the dexterity measure."""
-    jobs: int = 2
+    jobs: int
     """Number of threads; the result does not depend on it."""
     approach: bool = False
     """Whether a goal counts as reached only by postures that can be approached."""
@@ -84,9 +83,14 @@ class ScoringSetup:
         measure: str,
         jobs: int,
         sets: SetOptions,
+        only: Sequence[str] = (),
+        constraints: Constraints = NO_CONSTRAINTS,
+        now: Mapping[str, float] | None = None,
+        person: PersonLike | None = None,
         approach: bool = False,
+        blocks: BlockFolder | None = None,
+        engine: ScoringEngine | None = None,
         build: Callable[[Job], Scene] = Job.scene,
-        **options: Unpack[JobOptions],
     ) -> Self:
         """Load and check everything, and build the scene.
 
@@ -96,34 +100,17 @@ class ScoringSetup:
         Raises:
             UnknownNameError: If a task, environment, robot, frame or measure of that name does not
                 exist.
-            DataFileError: If a file cannot be used, or the goals of the task name several hands.
+            DataFileError: If a file cannot be used.
             GridError: If the grid is empty or enormous.
             TcsError: If an option of the sets is out of range.
         """
         dexterity(measure)
-        of_sets = checked_options(**sets)
-        job = load_job(task, environment, robot, **options)
-        references = data_references(job, task, environment, robot)
-        return cls(job, build(job), references, of_sets, measure, jobs, approach)
-
-    @classmethod
-    def load_hands(
-        cls,
-        task: str | Path | Task,
-        environment: str | Path | EnvironmentFile,
-        robot: str | Path | RobotFile,
-        *,
-        measure: str,
-        sets: SetOptions,
-        **options: Unpack[JobOptions],
-    ) -> tuple[Self, ...]:
-        """Load and check everything as `load`, and build the scene of each hand of the goals."""
-        dexterity(measure)
-        of_sets = checked_options(**sets)
-        return tuple(
-            cls(job, job.scene(), data_references(job, task, environment, robot), of_sets, measure)
-            for job in load_jobs(task, environment, robot, **options)
+        options = checked_options(**sets)
+        job = load_job(
+            task, environment, robot, only=only, constraints=constraints, now=now, person=person
         )
+        references = data_references(job, task, environment, robot)
+        return cls(job, build(job), references, options, measure, jobs, approach, blocks, engine)
 
     def score(
         self,
@@ -321,24 +308,18 @@ def score(
     """
     begun = time.perf_counter()
     robots = {"": robot} if arms is None else arm_references(robot, arms)
-    with_hands = {
-        arm: tuple(
-            replace(setup, jobs=jobs, approach=approach, blocks=blocks, engine=engine)
-            for setup in ScoringSetup.load_hands(
-                task, environment, of_arm, measure=measure, sets=sets, only=only,
-                constraints=constraints, now=now, person=person,
-            )
+    setups = {
+        arm: ScoringSetup.load(
+            task, environment, of_arm, measure=measure, jobs=jobs, sets=sets, only=only,
+            constraints=constraints, now=now, person=person, approach=approach, blocks=blocks,
+            engine=engine,
         )
         for arm, of_arm in robots.items()
     }  # fmt: skip
-    hands = next(iter(with_hands.values()))
-    if len(with_hands) > 1:
-        check_arms_are_free(hands)
-        setups = {arm: setup for arm, (setup,) in with_hands.items()}
+    if len(setups) > 1:
         return score_arms(setups, begun=begun, on_progress=on_progress, on_compile=on_compile)
-    if len(hands) > 1:
-        return score_hands(hands, begun=begun, on_progress=on_progress, on_compile=on_compile)
-    return hands[0].score(begun=begun, on_progress=on_progress, on_compile=on_compile)
+    (setup,) = setups.values()
+    return setup.score(begun=begun, on_progress=on_progress, on_compile=on_compile)
 
 
 def _task_as_dict(task: Task) -> dict[str, Any]:
@@ -350,7 +331,6 @@ def _task_as_dict(task: Task) -> dict[str, Any]:
         "tool": task.tool,
         "environments": list(task.environments),
         "allowed_contacts": [list(pair) for pair in task.allowed_contacts],
-        **({"tools": dict(task.tools)} if task.tools else {}),
         "goals": [
             {
                 "name": goal.name,
@@ -361,8 +341,6 @@ def _task_as_dict(task: Task) -> dict[str, Any]:
                 "approach": _line_as_dict(goal.approach),
                 "retreat": _line_as_dict(goal.retreat),
                 **({} if goal.free is None else {"free": str(goal.free)}),
-                **({"arm": goal.arm} if goal.arm else {}),
-                **({"tool": goal.tool} if goal.tool else {}),
             }
             for goal in task.goals
         ],

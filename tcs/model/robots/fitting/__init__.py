@@ -8,6 +8,7 @@ those of a robot file enclose its surface (`enclosure`).
 from __future__ import annotations
 
 from tcs.model.robots.fitting.bodies import BodyFit, fit_robot, refit, refit_parts, target_of
+from tcs.model.robots.fitting.bounding import enclose_axis
 from tcs.model.robots.fitting.covering import Target
 from tcs.model.robots.fitting.enclosure import BodyEnclosure, enclosure
 from tcs.model.robots.fitting.parts import Part
@@ -19,6 +20,7 @@ __all__ = [
     "Part",
     "Spots",
     "Target",
+    "enclose_axis",
     "enclosure",
     "fit_robot",
     "refit",

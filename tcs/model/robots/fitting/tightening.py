@@ -41,6 +41,8 @@ FINEST_PITCH = 0.0005
 """Least distance of the points of the grid by which the space outside is measured [m]."""
 CELLS = 1_000_000
 """Most points of the grid in the box around a body."""
+SPOT_CELLS = 3_000_000
+"""The same for a body with spots, where others pass it closely."""
 PIECE = 0.006
 """Longest edge of a piece [m], if the grid is finer than half of it; pieces that no shape contains
 are cut further."""
@@ -73,6 +75,7 @@ def tightened(
     shapes: Iterable[Primitive],
     splits: Mapping[str, int],
     spots: Mapping[str, Spots] = MappingProxyType({}),
+    rounds: Mapping[str, Iterable[Primitive]] = MappingProxyType({}),
 ) -> tuple[Primitive, ...]:
     """Return primitives that enclose a robot, those of some bodies made tighter.
 
@@ -85,6 +88,7 @@ def tightened(
         shapes: Primitives that enclose it.
         splits: Largest number of shapes that are added, by body.
         spots: Where others pass a body closely: there its shapes become the closest.
+        rounds: Shapes that are added before, by body, along parts that are round.
 
     Raises:
         UnknownNameError: If a body has no primitive.
@@ -98,7 +102,8 @@ def tightened(
         if body not in found or body not in surfaces:
             raise UnknownNameError("body", body, found, where=f"primitives '{robot.primitives}'")
         triangles = surfaces[body][2]
-        tightening = Tightening(body, found[body], triangles, spots.get(body, ()))
+        given = (*found[body], *rounds.get(body, ()))
+        tightening = Tightening(body, given, triangles, spots.get(body, ()))
         tightening.reduce()
         tightening.split(most)
         # What shapes leave each other has changed.
@@ -128,7 +133,7 @@ class Tightening:
         """
         self._body, self._shapes = body, list(shapes)
         volume = float(np.ptp(triangles, axis=(0, 1)).prod())
-        pitch = max(FINEST_PITCH, float(np.cbrt(volume / CELLS)))
+        pitch = max(FINEST_PITCH, float(np.cbrt(volume / (SPOT_CELLS if spots else CELLS))))
         reach = _overhang(self._shapes, triangles)
         self._solid, inside = _measured(triangles, pitch, reach)
         self._worth = _worth(self._solid, spots)
@@ -205,9 +210,16 @@ class Tightening:
         for halves in self._halves(whole, alone):
             boxes = [enclose(self._body, points, "box", whole.rotation) for points in halves]
             left = np.any([box.contains(protruding) for box in boxes], axis=0)
-            added = self._added(cells[left])
-            if added < least:
-                best, least = list(zip(boxes, halves, strict=True)), added
+            tried = [(boxes, cells[left])]
+            if whole.kind == "capsule":
+                # Boxes around slices of a round body have corners.
+                capsules = [_within_capsule(whole, points) for points in halves]
+                both = np.concatenate([self._outside(capsule) for capsule in capsules])
+                tried.append((capsules, np.unique(both)))
+            for shapes, protruded in tried:
+                added = self._added(protruded)
+                if added < least:
+                    best, least = list(zip(shapes, halves, strict=True)), added
         if best is None:
             self._put(k, whole)
             return False
@@ -383,6 +395,7 @@ def _around(body: str, shape: Primitive, points: FloatArray) -> list[Primitive]:
     ]
     if shape.kind == "capsule":
         found.append(_within_capsule(shape, points))
+        found.append(enclose(body, points, "capsule", shape.rotation))
     return found
 
 

@@ -18,6 +18,7 @@ from tcs.model.robots.primitives import enclosed, read_primitives, union_volume
 def coarse(monkeypatch):
     """A grid of 5 mm for drums of 20 cm, which is quick."""
     monkeypatch.setattr(module, "CELLS", 64_000)
+    monkeypatch.setattr(module, "SPOT_CELLS", 64_000)
 
 
 @pytest.fixture(scope="module")
@@ -136,6 +137,39 @@ def test_splits_of_a_capsule_never_protrude_more(steps):
     assert excess == sorted(excess, reverse=True)
     assert excess[-1] < 0.7 * excess[0]
     assert enclosed(tightening.shapes, steps).all()
+
+
+def test_a_round_body_is_split_into_capsules():
+    """Two rods on one axis: boxes around them would have corners."""
+    thick = trimesh.creation.cylinder(0.05, 0.4, sections=24)
+    thin = trimesh.creation.cylinder(0.03, 0.4, sections=24).apply_translation((0, 0, 0.4))
+    rods = np.concatenate([thick.triangles, thin.triangles])
+    around = enclose_axis("b", np.array([0, 0, -0.2]), np.array([0, 0, 0.6]), 0.05)
+    tightening = Tightening("b", (around,), rods)
+    before = tightening.excess
+    tightening.split(1)
+    assert [shape.kind for shape in tightening.shapes] == ["capsule", "capsule"]
+    assert tightening.excess < 0.6 * before
+    assert enclosed(tightening.shapes, rods).all()
+
+
+def test_a_body_with_spots_has_a_finer_grid(steps, wide, monkeypatch):
+    monkeypatch.setattr(module, "CELLS", 1_000)
+    monkeypatch.setattr(module, "SPOT_CELLS", 8_000)
+    coarse, fine = (Tightening("b", wide, steps, s) for s in ((), [(0.1, 0.0, 0.0, 0.02)]))
+    assert fine._solid.pitch == pytest.approx(coarse._solid.pitch / 2)
+
+
+def test_round_shapes_replace_those_that_they_make_unneeded(pr2, monkeypatch):
+    """A rod within a box that protrudes, and a capsule along the rod, whose caps go beyond it."""
+    rod = np.asarray(trimesh.creation.cylinder(0.05, 0.5, sections=48).triangles)
+    box = enclose("b", corner_points(rod), "box", np.eye(3))
+    monkeypatch.setattr(module, "surfaces_to_enclose", lambda _: {"b": (None, None, rod)})
+    capsule = enclose_axis("b", np.array([0, 0, -0.25]), np.array([0, 0, 0.25]), 0.0501)
+    assert [s.kind for s in tightened(pr2, (box,), {"b": 0})] == ["box"]
+    closer = tightened(pr2, (box,), {"b": 0}, rounds={"b": [capsule]})
+    assert [s.kind for s in closer] == ["capsule"]
+    assert enclosed(closer, rod).all()
 
 
 def test_a_box_that_fits_is_not_split():

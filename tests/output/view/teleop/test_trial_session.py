@@ -45,8 +45,7 @@ class Script:
 def session(study, desk):
     found = TrialSession(study, "novel", port=None, on_stop=lambda _: None)
     found._session.page.operator.source = desk
-    yield found
-    found.close()
+    return found
 
 
 @pytest.fixture
