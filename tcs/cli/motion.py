@@ -61,6 +61,13 @@ def plan(
             help="Order of the goals at a stop: that of the shortest tour, or their own.",
         ),
     ] = "best",
+    jerk: Annotated[
+        float | None,
+        typer.Option(
+            help="Greatest jerk of every joint [rad/s^3], beside those of the robot file.",
+            show_default="those of the robot file",
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -109,6 +116,7 @@ def plan(
             loaded,
             members,
             order=order,
+            jerk=jerk,
             seed=seed,
             on_progress=on_progress,
             on_compile=terminal.note_compiling,

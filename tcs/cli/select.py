@@ -136,7 +136,7 @@ def select(
     choice = choose(here, motions=motions)
     for warning in choice.warnings:
         terminal.note(warning)
-    result = choice_in_words(loaded, choice)
+    result = choice_in_words(loaded, choice, here)
     if motions is not None:
         compared = Executability.of(loaded, motions, choice, choose(here))
         result["executable"] = compared.to_json(choice)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -143,6 +144,8 @@ class MotionPlan:
     seed: int
     seconds: float
     """Duration of planning, timing and re-check [s]."""
+    jerk_limits: tuple[float, ...] | None = None
+    """Greatest jerk of each joint [rad/s^3], inf where there is none; None without limits."""
 
     @property
     def goals_done(self) -> int:
@@ -162,7 +165,14 @@ class MotionPlan:
             "verified": {"edges": self.edges, "false": self.false},
             "seed": self.seed,
             "seconds": self.seconds,
+            "jerk_limits": self._jerk_limits(),
         }
+
+    def _jerk_limits(self) -> list[float | None] | None:
+        """Return the jerk limits as JSON knows numbers: null where there is none."""
+        if self.jerk_limits is None:
+            return None
+        return [limit if math.isfinite(limit) else None for limit in self.jerk_limits]
 
 
 def joined(parts: Sequence[Timed]) -> Timed:

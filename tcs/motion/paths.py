@@ -7,6 +7,7 @@ import numpy as np
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.motion.connect import connect
 from tcs.kernel.motion.edges import certified
+from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
 from tcs.motion.curves import Curve
 from tcs.motion.stops import Stop
 
@@ -18,6 +19,8 @@ SHORTCUTS = 60
 """Number of random shortcuts that are tried."""
 WIDEST_CORNER = 0.3
 """Greatest length of an edge that a rounded corner takes up [rad, norm of the joints]."""
+LIMIT_ROUNDING = 1e-10
+"""How far control points of a curve may be beyond joint limits, as sums round [rad]."""
 NARROWEST_CORNER = 0.005
 """Length below which a corner is not rounded: the arm stops there."""
 
@@ -41,7 +44,7 @@ def find_path(
     return (stop.trees.path[:count].copy(), int(stop.trees.ends[1])) if count else None
 
 
-def rounded(stop: Stop, path: FloatArray) -> list[Curve]:
+def rounded(stop: Stop, path: FloatArray, widest: float = WIDEST_CORNER) -> list[Curve]:
     """Return a path as curves without corners; the arm stops between curves.
 
     Each corner becomes a parabola that touches both edges, as wide as is certified.
@@ -49,6 +52,8 @@ def rounded(stop: Stop, path: FloatArray) -> list[Curve]:
     Args:
         stop: The initial configuration.
         path: Postures with certified straight edges [rad], shape (n, 7).
+        widest: Greatest length of an edge that a corner takes up [rad, norm of the joints]; 0
+            leaves the edges straight.
     """
     lengths = np.linalg.norm(np.diff(path, axis=0), axis=1)
     path = path[np.concatenate([[True], lengths > 1e-9])]
@@ -59,7 +64,8 @@ def rounded(stop: Stop, path: FloatArray) -> list[Curve]:
     directions = np.diff(path, axis=0) / lengths[:, None]
     knots, q, dq = [0.0], [path[0]], [directions[0]]
     for n in range(1, len(path) - 1):
-        wide = _corner(stop, path[n], directions[n - 1 : n + 1], lengths[n - 1 : n + 1])
+        most = min(widest, 0.45 * float(np.min(lengths[n - 1 : n + 1])))
+        wide = _corner(stop, path[n], directions[n - 1 : n + 1], most)
         here = float(np.sum(lengths[:n]))
         knots.append(here - wide)
         q.append(path[n] - wide * directions[n - 1])
@@ -77,9 +83,31 @@ def rounded(stop: Stop, path: FloatArray) -> list[Curve]:
     return curves
 
 
-def _corner(stop: Stop, corner: FloatArray, directions: FloatArray, lengths: FloatArray) -> float:
-    """Return how far from a corner its rounding may begin [rad], 0 if none is certified."""
-    wide = min(WIDEST_CORNER, 0.45 * float(np.min(lengths)))
+def is_certified(motion: MotionScene, work: MotionWorkspace, curve: Curve) -> bool:
+    """Return whether every piece of a curve is certified free of contact, within joint limits.
+
+    Args:
+        motion: The scene.
+        work: Scratch.
+        curve: The curve.
+    """
+    for piece in range(curve.pieces):
+        control = curve.control_points(piece)
+        beyond = np.maximum(motion.lower - control, control - motion.upper) > LIMIT_ROUNDING
+        if np.any(beyond & (motion.period == 0.0)) or certified(motion, work, control) < 1.0:
+            return False
+    return True
+
+
+def _corner(stop: Stop, corner: FloatArray, directions: FloatArray, wide: float) -> float:
+    """Return how far from a corner its rounding may begin [rad], 0 if none is certified.
+
+    Args:
+        stop: The initial configuration.
+        corner: The posture [rad], shape (7,).
+        directions: Unit directions of the edges before and after it, shape (2, 7).
+        wide: How far it may begin at most [rad].
+    """
     while wide > NARROWEST_CORNER:
         begin, end = corner - wide * directions[0], corner + wide * directions[1]
         third = 2.0 / 3.0

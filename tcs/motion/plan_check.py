@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 
 from tcs.errors import StoreFormatError
+from tcs.kernel.arrays import FloatArray
 from tcs.model.scene import goal_poses
 from tcs.motion.motion_plan import MotionPlan, Segment, StopPlan
 from tcs.motion.plans import value_of
 from tcs.motion.recheck import StopCheck
 from tcs.motion.stops import Stop
+from tcs.motion.timing import Timed
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.rebuild import rebuild_made_from
 
@@ -45,6 +47,9 @@ class PlanCheck:
     """Greatest velocity at a sample, as a fraction of its limit."""
     acceleration: float
     """Greatest mean acceleration between two samples, as a fraction of its limit."""
+    jerk: float | None
+    """Greatest mean jerk from one pair of samples to the next, rest before and after the motions of
+    a stop included, as a fraction of its limit; None if the plan has no jerk limits."""
 
     @property
     def is_sound(self) -> bool:
@@ -53,7 +58,7 @@ class PlanCheck:
             self.false == 0
             and self.jumps == 0
             and self.max_position_error <= POSITION_BAR
-            and max(self.velocity, self.acceleration) <= LIMIT_BAR
+            and max(self.velocity, self.acceleration, self.jerk or 0.0) <= LIMIT_BAR
         )
 
     def to_json(self) -> dict[str, Any]:
@@ -79,7 +84,7 @@ def check_plan(
     check_names(plan, job)
     total, done = sum(len(stop.segments) for stop in plan.stops), 0
     edges = false = jumps = goals = 0
-    error = velocity = acceleration = 0.0
+    error = velocity = acceleration = jerk = 0.0
     for planned in plan.stops:
         stop = stop_of(plan, planned, job, scene)
         check = StopCheck(stop)
@@ -94,10 +99,13 @@ def check_plan(
             rates = np.diff(timing.velocities, axis=0) / np.diff(timing.times)[:, None]
             velocity = max(velocity, float(np.max(np.abs(timing.velocities) / stop.velocity)))
             acceleration = max(acceleration, float(np.max(np.abs(rates) / stop.acceleration)))
+            if plan.jerk_limits is not None:
+                jerk = max(jerk, float(np.max(_greatest_jerk(timing) / plan.jerk_limits)))
             done += 1
             if on_progress is not None:
                 on_progress(done, total)
-    return PlanCheck(edges, false, jumps, goals, error, velocity, acceleration)
+    of_limits = None if plan.jerk_limits is None else jerk
+    return PlanCheck(edges, false, jumps, goals, error, velocity, acceleration, of_limits)
 
 
 def stop_of(plan: MotionPlan, planned: StopPlan, job: Job, scene: Any) -> Stop:
@@ -145,6 +153,21 @@ def _jumps(planned: StopPlan, stop: Stop) -> int:
     for end, (_, begin) in zip(ends[:-1], itertools.pairwise(begins), strict=True):
         jumps += int(np.any(np.abs(begin - end) > SAME_POSTURE))
     return jumps
+
+
+def _greatest_jerk(timing: Timed) -> FloatArray:
+    """Return the greatest mean jerk of each joint from one pair of samples to the next [rad/s^3].
+
+    Args:
+        timing: Samples of a motion; before and after it the joints rest.
+    """
+    steps = np.diff(timing.times)
+    rates = np.diff(timing.velocities, axis=0) / steps[:, None]
+    at_rest = np.zeros((1, 7))
+    steps, rates = np.concatenate([[0.0], steps, [0.0]]), np.concatenate([at_rest, rates, at_rest])
+    apart = 0.5 * (steps[1:] + steps[:-1])
+    greatest: FloatArray = np.max(np.abs(np.diff(rates, axis=0)) / apart[:, None], axis=0)
+    return greatest
 
 
 def _position_error(segment: Segment, stop: Stop) -> float:

@@ -114,6 +114,7 @@ def evaluate_plan(
     offsets = model.draw(samples, seed, stream=_STREAM)
     places = [_Place.of(planned, job, scene) for planned in stops]
     displacements = [displaced(job, scene, place.nominal, offsets) for place in places]
+    jerk = None if plan.jerk_limits is None else np.array(plan.jerk_limits)
     blind = np.zeros((samples, len(places)), dtype=np.bool_)
     again = np.zeros_like(blind)
     for i in range(samples):
@@ -122,7 +123,7 @@ def evaluate_plan(
             stop = place.displaced(state, seed)
             blind[i, number] = _is_free(stop, place.planned)
             if replan:
-                found, _ = plan_stop(stop, None, number, place.planned.goals)
+                found, _ = plan_stop(stop, None, number, place.planned.goals, jerk=jerk)
                 again[i, number] = set(found.goals) == set(place.planned.goals)
         if on_progress is not None:
             on_progress(i + 1, samples)

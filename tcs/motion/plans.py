@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tcs.errors import SelectionError, TcsError, UnknownNameError
 from tcs.kernel.cache import is_compiled
 from tcs.model.grid import Grid, InitialConfiguration
+from tcs.model.robots import LEAST_JERK, MOST_JERK
 from tcs.motion.motion_plan import GoalResult, MotionPlan
 from tcs.motion.recheck import StopCheck
 from tcs.motion.stop_tour import ORDERS, plan_stop
@@ -33,6 +34,7 @@ def plan(
     members: Choice | RefinedSet | Sequence[int] | InitialConfiguration,
     *,
     order: str = "best",
+    jerk: float | None = None,
     seed: int = 0,
     on_progress: Callable[[int, int], None] | None = None,
     on_compile: Callable[[], None] | None = None,
@@ -50,6 +52,8 @@ def plan(
             tables one after the other. Or one initial configuration, on or off the grid, from which
             every goal is tried.
         order: Order of the goals at a stop: "best" for the shortest tour, "given" for their own.
+        jerk: Greatest jerk of every joint [rad/s^3], beside those of the robot file; None for
+            these alone.
         seed: Seed of the planner; the plan is the same for the same seed.
         on_progress: Called with the finished per cent and 100, after every goal and every motion
             that is re-checked; what it raises ends the planning.
@@ -62,13 +66,18 @@ def plan(
         StoreMismatchError: If the models differ from those the file was made from.
         RobotError: If a velocity limit of the arm is unknown.
         UnknownNameError: If there is no such order.
-        TcsError: If there is no such configuration, or it lacks an axis.
+        TcsError: If there is no such configuration, it lacks an axis, or the jerk is out of its
+            range.
         SelectionError: If the file is of several arms, and the configurations use more than one,
             or one is not given by its number.
     """
     begun = time.perf_counter()
     if order not in ORDERS:
         raise UnknownNameError("order", order, ORDERS)
+    if jerk is not None and not LEAST_JERK <= jerk <= MOST_JERK:
+        raise TcsError(
+            f"plan: the jerk is {jerk:g} rad/s^3, but must be in [{LEAST_JERK:g}, {MOST_JERK:g}]."
+        )
     numbers: Sequence[int] | None = None
     if isinstance(members, Choice) and members.refined is not None:
         table = 0 if members.match is None else members.match.index
@@ -80,6 +89,7 @@ def plan(
         numbers = _numbers(file, members)
         file, members = _of_one_arm(file, numbers)
     job, scene, _ = rebuild_scene(file)
+    limits = np.minimum(job.spec.robot.arm_jerks(), np.inf if jerk is None else jerk)
     if on_compile is not None and not is_compiled(ENTRY):
         on_compile()
     if isinstance(members, RefinedSet):
@@ -104,7 +114,7 @@ def plan(
         stop = Stop.at_values(job, scene, values, seed)
         index = h if numbers is None else numbers[number]
         report = _StopProgress(on_progress, number, len(places))
-        planned, found = plan_stop(stop, index, number, goals, order, report.planned)
+        planned, found = plan_stop(stop, index, number, goals, order, limits, report.planned)
         results |= {result.goal: result for result in found}
         stops.append(planned)
         check = StopCheck(stop)
@@ -122,6 +132,7 @@ def plan(
         false=false,
         seed=seed,
         seconds=time.perf_counter() - begun,
+        jerk_limits=tuple(limits.tolist()) if np.any(np.isfinite(limits)) else None,
     )
 
 

@@ -8,14 +8,17 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray
-from tcs.motion.approach import Access, Accesses, accesses, joint_time
+from tcs.motion.approach import Access, Accesses, accesses, is_straight, joint_time
 from tcs.motion.curves import Curve
 from tcs.motion.motion_plan import GoalResult, Segment, StopPlan, joined
-from tcs.motion.paths import find_path, rounded
+from tcs.motion.paths import WIDEST_CORNER, find_path, is_certified, rounded
+from tcs.motion.smoothing import RateLimits, sampled, smoothed
 from tcs.motion.stops import BodyPair, Stop
-from tcs.motion.timing import timed
+from tcs.motion.timing import Timed, timed
 from tcs.motion.tour import REST, best_tour, given_tour
 
+TimedCurve = tuple[Curve, Timed]
+"""A curve and its samples in time."""
 ORDERS = {"best": best_tour, "given": given_tour}
 """Orders of the goals: that of the shortest tour, or their own."""
 
@@ -26,6 +29,7 @@ def plan_stop(
     number: int,
     goals: Sequence[int],
     order: str = "best",
+    jerk: FloatArray | None = None,
     on_step: Callable[[float], None] = lambda _: None,
 ) -> tuple[StopPlan, list[GoalResult]]:
     """Plan the tour of one stop through goals.
@@ -36,13 +40,14 @@ def plan_stop(
         number: Number of the stop in the plan.
         goals: Numbers of the goals.
         order: Order of the goals, one of ORDERS.
+        jerk: Jerk limits [rad/s^3], shape (7,), inf for joints without one; None for no limits.
         on_step: Called with the finished fraction after each goal is approached, and after each is
             visited; what it raises ends the planning.
 
     Returns:
         The motions, and what became of each goal.
     """
-    tour = _Tour(stop, number)
+    tour = _Tour(stop, number, np.full(7, np.inf) if jerk is None else jerk)
     blocked = stop.rest_contact()
     steps = 2 * len(goals) + 1
     for done, goal in enumerate(goals, 1):
@@ -62,8 +67,9 @@ def plan_stop(
 class _Tour:
     """The tour of one stop while it is planned."""
 
-    def __init__(self, stop: Stop, number: int) -> None:
+    def __init__(self, stop: Stop, number: int, jerk: FloatArray) -> None:
         self.stop, self.number = stop, number
+        self.limits = RateLimits(stop.velocity, stop.acceleration, jerk)
         self.found: dict[int, Accesses] = {}
         self.results: dict[int, GoalResult] = {}
         self.segments: list[Segment] = []
@@ -102,6 +108,7 @@ class _Tour:
     def visit(self, goal: int, access: Access) -> None:
         """Append the motions to a goal, in and out, or note that there are none."""
         begun = time.perf_counter()
+        here = "rest" if self.goal is None else f"goal {self.goal}"
         self.stop.forget_contacts()
         chosen, path = access, self._path(access.begin[None])
         if path is None:
@@ -109,17 +116,21 @@ class _Tour:
             others = self.found[goal].found
             path = self._path(np.array([other.begin for other in others]))
             chosen = access if path is None else others[path[1]]
-        if path is None:
-            here = "rest" if self.goal is None else f"goal {self.goal}"
+        moves = None if path is None else self._timed_path(path[0])
+        if path is None or moves is None:
             pair = self.stop.most_frequent_contact()
             self.fail(goal, "no_path", pair, f"{here} to goal {goal}", begun)
             return
-        self._move(path[0], goal)
         # Joints without limits may have arrived full turns away.
-        offset = self.q - chosen.begin
-        for kind, curve in (("approach", chosen.approach), ("retreat", chosen.retreat)):
-            curve = curve.shifted(offset)
-            self._append(kind, goal, goal, (curve,))
+        offset = path[0][-1] - chosen.begin
+        approach = self._timed_line(chosen.approach.shifted(offset))
+        retreat = self._timed_line(chosen.retreat.shifted(offset))
+        if approach is None or retreat is None:
+            self.fail(goal, "approach_limits", None, f"approach of goal {goal}", begun)
+            return
+        self._append("move", self.goal, goal, moves)
+        self._append("approach", goal, goal, approach)
+        self._append("retreat", goal, goal, retreat)
         self.q, self.goal = self.segments[-1].curves[-1].q[-1], goal
         self.results[goal] = GoalResult(goal, self.number, True, "")
 
@@ -128,25 +139,53 @@ class _Tour:
         if self.goal is None:
             return True
         path = self._path(self.stop.rest[None])
-        if path is None:
+        moves = None if path is None else self._timed_path(path[0])
+        if moves is None:
             return False
-        self._move(path[0], None)
+        self._append("move", self.goal, None, moves)
         return True
 
     def _path(self, ends: FloatArray) -> tuple[FloatArray, int] | None:
         return find_path(self.stop, self.q[None], ends)
 
-    def _move(self, path: FloatArray, goal: int | None) -> None:
-        curves = tuple(rounded(self.stop, path))
-        if curves:
-            self._append("move", self.goal, goal, curves)
-        self.q = path[-1]
+    def _timed_path(self, path: FloatArray) -> list[TimedCurve] | None:
+        """Return the timed curves along a path, None if there are none within the jerk limits."""
+        if not self.limits.bound_jerk:
+            return [self._timed(curve) for curve in rounded(self.stop, path)]
+
+        def accepted(motion: Curve) -> bool:
+            return is_certified(self.stop.motion, self.stop.work, motion)
+
+        # Along straight edges alone, the arm cuts no corner.
+        for widest in (WIDEST_CORNER, 0.0):
+            curves = rounded(self.stop, path, widest)
+            motions = [smoothed(curve, self.limits, accepted) for curve in curves]
+            found = [(motion, sampled(motion)) for motion in motions if motion is not None]
+            if len(found) == len(curves):
+                return found
+        return None
+
+    def _timed_line(self, line: Curve) -> list[TimedCurve] | None:
+        """Return the timed curve along a straight motion of the tool, None as `_timed_path`."""
+        if not self.limits.bound_jerk:
+            return [self._timed(line)]
+        stop = self.stop
+
+        def accepted(motion: Curve) -> bool:
+            return is_straight(stop, motion) and is_certified(stop.lines, stop.line_work, motion)
+
+        motion = smoothed(line, self.limits, accepted)
+        return None if motion is None else [(motion, sampled(motion))]
+
+    def _timed(self, curve: Curve) -> TimedCurve:
+        return curve, timed(curve, self.limits.velocity, self.limits.acceleration)
 
     def _append(
-        self, kind: str, start: int | None, end: int | None, curves: tuple[Curve, ...]
+        self, kind: str, start: int | None, end: int | None, parts: Sequence[TimedCurve]
     ) -> None:
-        parts = [timed(curve, self.stop.velocity, self.stop.acceleration) for curve in curves]
-        self.segments.append(Segment(kind, start, end, curves, joined(parts)))
+        if parts:
+            curves, timings = zip(*parts, strict=True)
+            self.segments.append(Segment(kind, start, end, curves, joined(timings)))
 
     def fail(
         self, goal: int, reason: str, pair: BodyPair | None, segment: str, begun: float

@@ -68,7 +68,17 @@ def _plan(plain: Mapping[str, Any]) -> MotionPlan:
         false=int(verified["false"]),
         seed=int(plain["seed"]),
         seconds=_number(plain["seconds"]),
+        jerk_limits=_jerk_limits(plain.get("jerk_limits")),
     )
+
+
+def _jerk_limits(plain: Any) -> tuple[float, ...] | None:
+    if plain is None:
+        return None
+    limits = tuple(math.inf if limit is None else _number(limit) for limit in plain)
+    if len(limits) != 7 or min(limits) <= 0.0:
+        raise ValueError("'jerk_limits' must be null or seven numbers above 0, or null")
+    return limits
 
 
 def _stop(plain: Mapping[str, Any]) -> StopPlan:

@@ -24,7 +24,7 @@ CURVATURE = 0.7
 """Fraction of the acceleration limit that the curvature of the path may take up; the rest is left
 to change the rate."""
 SAMPLE_SECONDS = 0.05
-"""Greatest time between two samples of a timed curve [s]."""
+"""Greatest time between two samples of a motion [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,13 +44,19 @@ class Timed:
         return float(self.times[-1])
 
 
-def timed(curve: Curve, velocity: FloatArray, acceleration: FloatArray) -> Timed:
+def timed(
+    curve: Curve,
+    velocity: FloatArray,
+    acceleration: FloatArray,
+    sample_seconds: float = SAMPLE_SECONDS,
+) -> Timed:
     """Return a timing within the limits, the fastest for straight lines.
 
     Args:
         curve: The path.
         velocity: Velocity limits [rad/s], shape (7,).
         acceleration: Acceleration limits [rad/s^2], shape (7,).
+        sample_seconds: Greatest time between two samples [s].
     """
     count = max(LEAST_INTERVALS, INTERVALS // curve.pieces)
     steps = np.repeat(np.diff(curve.knots) / count, count)
@@ -60,7 +66,7 @@ def timed(curve: Curve, velocity: FloatArray, acceleration: FloatArray) -> Timed
     rates = np.sqrt(squares)
     durations = 2.0 * steps / (rates[:-1] + rates[1:])
     ends = np.concatenate([[0.0], np.cumsum(durations)])
-    samples = max(2, int(np.ceil(ends[-1] / SAMPLE_SECONDS)) + 1)
+    samples = max(2, int(np.ceil(ends[-1] / sample_seconds)) + 1)
     times = np.linspace(0.0, ends[-1], samples)
     interval = np.clip(np.searchsorted(ends, times, side="right") - 1, 0, len(steps) - 1)
     within = times - ends[interval]

@@ -213,7 +213,7 @@ class Engine:
                 frames=request.frames,
             )
             choice = choose(motions=motions)
-            result = {**choice_in_words(file, choice), **scored_entries(file)}
+            result = {**choice_in_words(file, choice, here), **scored_entries(file)}
             if motions is not None:
                 compared = Executability.of(file, motions, choice, choose())
                 result["executable"] = compared.to_json(choice)

@@ -16,7 +16,7 @@ from tcs.placement.store import ScoreFile, file_of_arm
 from tcs.placement.tables import Reason
 
 if TYPE_CHECKING:
-    from tcs.output.report.score.pictures import ScoredScene
+    from tcs.output.report.score.scored_scenes import ScoredScene
 
 _KEPT = 3
 """Most scenes that are kept."""
@@ -119,7 +119,7 @@ class ScenePostures:
 
     def _scene(self, digest: str, file: ScoreFile) -> ScoredScene:
         """Return the scene of a file, built when it is first looked at."""
-        from tcs.output.report.score.pictures import scored_scene
+        from tcs.output.report.score.scored_scenes import scored_scene
         from tcs.output.report.score.shown_set import ShownSet
 
         if digest not in self._scenes:

@@ -205,6 +205,7 @@ class PlanRequest(Observed, State):
     max_members: Annotated[int, Field(strict=True, ge=1, le=3)] | None = None
     configuration: Annotated[list[int], Field(max_length=3)] = Field(default_factory=list)
     order: Text = "best"
+    jerk: Number | None = None
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
 
 

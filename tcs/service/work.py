@@ -169,6 +169,7 @@ class SceneWork:
             file,
             self._stops(file, request),
             order=request.order,
+            jerk=request.jerk,
             seed=request.seed,
             on_progress=progress,
             on_compile=progress.compiling,

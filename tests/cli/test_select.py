@@ -25,7 +25,7 @@ def test_select_prints_the_choice(tcs_command, small_file):
     result = ran.json
     assert set(result) == {
         "members", "measure", "reachability", "manipulability", "cost", "utility", "seconds",
-        "unreachable", "net_utility", "moves", "configurations", "places",
+        "unreachable", "net_utility", "moves", "configurations", "places", "here_place",
     }  # fmt: skip
     choice = tcs.select(tcs.load(small_file), state())
     assert result["configurations"] == [choice.indices[i] for i in choice.order]

@@ -13,7 +13,7 @@ from tcs.kernel.dexterity import MEASURES
 from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.problem import build_problem
 from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED, TOO_FAR
-from tcs.kernel.six_joints.arm import six_joint_arm
+from tcs.kernel.six_joints.arm import is_general, six_joint_arm
 from tcs.kernel.six_joints.solutions import MOST_SOLUTIONS, six_joint_solutions
 from tcs.kernel.verification.dense import dense_scan
 from tcs.kernel.verification.newton_solutions import newton_solutions, within
@@ -22,10 +22,41 @@ from tests.kernel.judge import compare, is_true, stratified
 from tests.kernel.shapes import around, random_arm, random_joints, rotation
 from tests.kernel.toy import scores_of, toy_grid, toy_scene
 
-CLASSES = ("spherical wrist", "parallel axes")
-SCENES = {"spherical wrist": 6, "parallel axes": 10}
+CLASSES = ("spherical wrist", "parallel axes", "elimination")
+SCENES = {"spherical wrist": 6, "parallel axes": 10, "elimination": 10}
 """Seeds of toy scenes with every reason that depends on the arm."""
 FLIP = np.diag([1.0, -1.0, -1.0])
+RIGHT = np.pi / 2
+BENT_WRISTS = {
+    # d, a and alpha of each joint: Kinova's Jaco with its bent wrist (j2n6s200), axes 4, 5 and 6 at
+    # 60 degrees; an arm whose last axis passes the one before it at 0.15 m; an industrial arm with
+    # a spherical wrist whose axes 1 and 2 are 0.15 m apart.
+    "bent": (
+        (0.2755, 0.0, RIGHT),
+        (0.0, 0.41, np.pi),
+        (-0.0098, 0.0, RIGHT),
+        (-0.25008, 0.0, np.pi / 3),
+        (-0.08556, 0.0, np.pi / 3),
+        (-0.20278, 0.0, np.pi),
+    ),
+    "offset": (
+        (0.0, 0.0, -RIGHT),
+        (0.0, 0.71, np.pi),
+        (0.0, 0.0, -RIGHT),
+        (-0.54, 0.0, RIGHT),
+        (0.15, 0.0, -RIGHT),
+        (-0.16, 0.0, np.pi),
+    ),
+    "shoulder": (
+        (0.4, 0.15, -RIGHT),
+        (0.0, 0.6, 0.0),
+        (0.0, 0.12, -RIGHT),
+        (0.62, 0.0, RIGHT),
+        (0.0, 0.0, -RIGHT),
+        (0.1, 0.0, 0.0),
+    ),
+}
+"""Arms without a closed form here, by their Denavit-Hartenberg parameters [m, rad]."""
 
 
 @cache
@@ -46,10 +77,23 @@ def six_joint_chain(name, seed, limited=True):
         # Axes 6 and 7 of the chain meet, but not where the origins of L6 and L7 are.
         R[6] = rotation(rng)
         p[6] = 0.1 * R[6][:, 2] + [0.0, 0.0, 0.05]
+    if name == "elimination":
+        R = np.array([np.eye(3), np.eye(3), *(rotation(rng) for _ in range(6))])
+        p = rng.uniform(-0.3, 0.3, (8, 3))
+        p[1] = 0.0
     lower, upper = (np.full(7, -np.inf), np.full(7, np.inf))
     if limited:
         lower[1:], upper[1:] = chain.lower[1:], chain.upper[1:]
     return Chain(R, p, lower, upper, joints=6)
+
+
+def bent_wrist(name):
+    """Return an arm without joint limits from its Denavit-Hartenberg parameters."""
+    R, p = np.tile(np.eye(3), (8, 1, 1)), np.zeros((8, 3))
+    for i, (d, a, alpha) in enumerate(BENT_WRISTS[name]):
+        c, s = np.cos(alpha), np.sin(alpha)
+        R[i + 2], p[i + 2] = [[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]], [a, 0.0, d]
+    return Chain(R, p, np.full(7, -np.inf), np.full(7, np.inf), joints=6)
 
 
 def drawn(rng, chain):
@@ -148,9 +192,42 @@ def test_limits_of_more_than_a_turn_keep_one_angle_of_each_solution():
     assert len(found) == len(free) == len(within(wide, newton_solutions(wide, R, p)))
 
 
-def test_an_arm_without_a_closed_form_is_refused():
-    rng = np.random.default_rng(0)
-    chain = six_joint_chain("parallel axes", 0)
-    skew = chain._replace(R=np.array([rotation(rng) for _ in range(8)]))
-    with pytest.raises(ArmClassError, match=r"six joints.*degrees apart.*pass each other"):
-        six_joint_arm(skew)
+@pytest.mark.parametrize("name", BENT_WRISTS)
+def test_elimination_finds_postures_whose_second_joints_lie_close_together(name):
+    chain = bent_wrist(name)
+    arm, rng = six_joint_arm(chain), np.random.default_rng(0)
+    assert is_general(arm)
+    for _ in range(300):
+        q, (R, p) = drawn(rng, chain)
+        found = six_joint_solutions(arm, R, p)
+        assert is_among(q, found)
+        for other in found:
+            np.testing.assert_allclose(link_poses(chain, other)[-1][0], R, atol=1e-7)
+
+
+def test_elimination_finds_all_solutions_of_a_bent_wrist():
+    chain = bent_wrist("bent")
+    arm, rng = six_joint_arm(chain), np.random.default_rng(1)
+    for _ in range(4):
+        _, (R, p) = drawn(rng, chain)
+        found, expected = six_joint_solutions(arm, R, p), newton_solutions(chain, R, p)
+        assert all(is_among(other, found) for other in expected)
+        assert len(found) >= len(expected)
+
+
+def test_elimination_finds_the_solutions_of_a_last_axis_parallel_to_the_first():
+    # Solutions then share the angle that elimination searches.
+    chain = bent_wrist("bent")
+    arm = six_joint_arm(chain)
+    found = six_joint_solutions(arm, FLIP, np.array([0.3, -0.2, 0.1]))
+    expected = newton_solutions(chain, FLIP, np.array([0.3, -0.2, 0.1]))
+    assert len(expected) >= 2
+    assert all(is_among(other, found) for other in expected)
+
+
+def test_an_arm_with_the_same_axis_twice_is_refused():
+    chain = six_joint_chain("elimination", 0)
+    R, p = chain.R.copy(), chain.p.copy()
+    R[6], p[6] = np.eye(3), 0.0
+    with pytest.raises(ArmClassError, match=r"six joints.*degrees apart.*some of its axes"):
+        six_joint_arm(chain._replace(R=R, p=p))

@@ -27,7 +27,7 @@ def show(
     ] = None,
     as_json: options.Json = False,
 ) -> None:
-    """Draw a map from above: a short line for each base pose, relative to the tool."""
+    """Draw a map from above: the best score at each base position, relative to the tool."""
     from tcs.capability import load_map
     from tcs.output.view.base_poses import save_map_layer
 

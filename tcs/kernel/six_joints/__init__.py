@@ -1,4 +1,4 @@
-"""Arms of six joints with a closed form: every goal has at most eight solutions, and all are found.
+"""Arms of six joints: a goal has at most sixteen solutions, and all are found.
 
 In: a goal pose in the arm base frame and the constants of the arm. Out: all its solutions, and the
 best one within the joint limits that is free of contact. No joint is free, so nothing is sampled.

@@ -1,6 +1,7 @@
-"""Constants of the closed form of an arm of six joints.
+"""Constants that solve an arm of six joints.
 
-Three classes have one. In numbers of the arm's own axes, 1 to 6:
+Three classes have a closed form; any other arm of six revolute joints is solved by `elimination`,
+from the constants in `general`. In numbers of the arm's own axes, 1 to 6:
 
 * spherical wrist: axes 1 and 2 meet, and axes 4, 5 and 6 meet in one point. With a further joint
   before the first one this is an arm of `tcs.kernel.analytic`, solved with that joint at 0.
@@ -27,6 +28,7 @@ from tcs.kernel.analytic.solver import (
 from tcs.kernel.arrays import Chain, FloatArray
 from tcs.kernel.lines import PARALLEL_TOLERANCE, axis_distance
 from tcs.kernel.problem import with_slides
+from tcs.kernel.six_joints.general import GeneralArm, general_arm, no_general_arm
 
 
 class SixJointArm(NamedTuple):
@@ -43,6 +45,8 @@ class SixJointArm(NamedTuple):
     lower: FloatArray
     """Joint limits [rad], shape (7,); infinite where continuous."""
     upper: FloatArray
+    general: GeneralArm
+    """Constants of an arm without a closed form; with direction 0 for one that has it."""
 
 
 def six_joint_arm(chain: Chain) -> SixJointArm:
@@ -52,28 +56,46 @@ def six_joint_arm(chain: Chain) -> SixJointArm:
         chain: An arm of six joints.
 
     Raises:
-        ArmClassError: If the arm has no closed form; the message says what it lacks.
+        ArmClassError: If it has prismatic joints and no closed form, or redundant axes; the message
+            says what it lacks.
     """
     lower, upper = (np.array(a, dtype=np.float64) for a in (chain.lower, chain.upper))
     if np.any(chain.slides):
         _check_sliding(chain)
         p, wrist = with_slides(chain), outside_solver(chain)
-        return SixJointArm(wrist, np.array(chain.R, order="C"), p, lower, upper)
+        R = np.array(chain.R, order="C")
+        return SixJointArm(wrist, R, p, lower, upper, no_general_arm())
     unlimited = chain._replace(lower=np.full(7, -np.inf), upper=np.full(7, np.inf))
     p, wrist = np.array(chain.p, order="C"), outside_solver(unlimited)
+    general = no_general_arm()
     try:
         solver = arm_solver(unlimited)
         if solver.free != FIRST:
             raise ArmClassError("joint 1 is not the free joint.")
         wrist = solver
     except ArmClassError:
-        p = _with_wrist_at_meeting_point(chain)
-    return SixJointArm(wrist=wrist, R=np.array(chain.R, order="C"), p=p, lower=lower, upper=upper)
+        try:
+            p = _with_wrist_at_meeting_point(chain)
+        except ArmClassError as error:
+            found = general_arm(chain)
+            if found is None:
+                raise ArmClassError(
+                    f"{error} Elimination cannot solve it either: some of its axes coincide or "
+                    "move the tool in the same way, so it cannot take every pose."
+                ) from None
+            general = found
+    R = np.array(chain.R, order="C")
+    return SixJointArm(wrist=wrist, R=R, p=p, lower=lower, upper=upper, general=general)
 
 
 def has_spherical_wrist(arm: SixJointArm) -> bool:
     """Return whether an arm is in the spherical-wrist class, else its axes are parallel."""
     return len(arm.wrist.branches) > 0
+
+
+def is_general(arm: SixJointArm) -> bool:
+    """Return whether an arm has no closed form and is solved by elimination."""
+    return arm.general.direction != 0
 
 
 def is_sliding(arm: SixJointArm) -> bool:
@@ -119,9 +141,9 @@ def _with_wrist_at_meeting_point(chain: Chain) -> FloatArray:
         angle = np.degrees(np.arcsin(min(tilt, 1.0)))
         apart = "are parallel" if passing is None else f"pass each other {passing[0]:.3g} m apart"
         raise ArmClassError(
-            "the arm of six joints has no closed form, without which six joints are not supported. "
-            "It needs axes 1 and 2 to meet, and 4, 5 and 6 in one point; or axes 2, 3 and 4 to be "
-            f"parallel (they are up to {angle:.3g} degrees apart), and 5 and 6 to meet (they "
+            "the arm of six joints has no closed form. "
+            "It would need axes 1 and 2 to meet, and 4, 5 and 6 in one point; or axes 2, 3 and 4 "
+            f"to be parallel (they are up to {angle:.3g} degrees apart), and 5 and 6 to meet (they "
             f"{apart})."
         )
     _, on_fifth, on_sixth = passing

@@ -9,9 +9,10 @@ from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, int_constant, jit
 from tcs.kernel.kinematics import link_poses, place_tool
 from tcs.kernel.six_joints.arm import SixJointArm
+from tcs.kernel.six_joints.elimination import is_known, solve_general
 
-MOST_SOLUTIONS = 8
-"""Greatest number of solutions: two for each of three choices."""
+MOST_SOLUTIONS = 16
+"""Greatest number of solutions; with a closed form eight: two for each of three choices."""
 TURN = 2.0 * np.pi
 ON_GOAL = 1e-7
 """Greatest error of a solution, in entries of the rotation matrix and of the position [m]."""
@@ -49,6 +50,8 @@ def solve_six_joints(
         for b in range(len(arm.wrist.branches)):
             sample_joints(arm.wrist, goal, arm.wrist.branches[b], 0.0, solutions[found])
             found += 1
+    elif arm.general.direction != 0:
+        found = solve_general(arm.general, arm.R, arm.p, R_AG, p_AG, solutions)
     elif arm.p.shape[1] > 3:
         found = _three_slides(arm, R_AG, p_AG, solutions)
     else:
@@ -62,7 +65,7 @@ def solve_six_joints(
             worst = max(worst, abs(p_AT[r] - p_AG[r]))
             for c in range(3):
                 worst = max(worst, abs(R_AT[r, c] - R_AG[r, c]))
-        if worst < ON_GOAL and not _is_known(solutions, kept, n):
+        if worst < ON_GOAL and not is_known(solutions, kept, solutions[n]):
             for k in range(7):
                 solutions[kept, k] = solutions[n, k]
             kept += 1
@@ -110,18 +113,6 @@ def six_joint_solutions(arm: SixJointArm, R_AG: FloatArray, p_AG: FloatArray) ->
     solutions = np.empty((MOST_SOLUTIONS, 7))
     count = solve_six_joints(arm, R, p, solutions)
     return solutions[: within_limits(arm, solutions, count)]
-
-
-@inner
-def _is_known(solutions: FloatArray, kept: int, n: int) -> bool:
-    """Return whether row n repeats one of the first rows, but for full turns."""
-    for m in range(kept):
-        apart = 0.0
-        for k in range(1, 7):
-            apart = max(apart, 1.0 - np.cos(solutions[m, k] - solutions[n, k]))
-        if apart < ROUNDING:
-            return True
-    return False
 
 
 @inner

@@ -16,7 +16,13 @@ from tcs.kernel.analytic.solver import FIRST, ArmSolver, arm_solver
 from tcs.kernel.arrays import Chain, FloatArray
 from tcs.kernel.lines import axis_distance
 from tcs.kernel.numeric.solutions import numeric_solutions
-from tcs.kernel.six_joints.arm import SixJointArm, has_spherical_wrist, is_sliding, six_joint_arm
+from tcs.kernel.six_joints.arm import (
+    SixJointArm,
+    has_spherical_wrist,
+    is_general,
+    is_sliding,
+    six_joint_arm,
+)
 from tcs.kernel.six_joints.solutions import six_joint_solutions
 from tcs.model.scene import Scene, arm_chain
 
@@ -34,6 +40,7 @@ ClassName = Literal[
     "six-joint spherical-wrist",
     "six-joint parallel-axes",
     "three prismatic joints",
+    "six-joint elimination",
 ]
 
 _MEETING = (("2-3", (2, 3)), ("5-6-7", (5, 6, 7)), ("1-2-3", (1, 2, 3)), ("5-6", (5, 6)))
@@ -50,8 +57,9 @@ class ArmClass:
             the free joint. "spherical-shoulder": axes 1, 2 and 3 meet, and axes 5 and 6; joint 7 is
             the free joint. "six-joint spherical-wrist": of six joints, axes 1 and 2 meet, and so do
             axes 4, 5 and 6; "six-joint parallel-axes": axes 2, 3 and 4 are parallel, and axes 5 and
-            6 meet. "three prismatic joints": three more are revolute. None: none of these, so there
-            is no closed form.
+            6 meet. "three prismatic joints": three more are revolute. "six-joint elimination": any
+            other six revolute joints, whose solutions are all found by elimination. None: none of
+            these.
         reason: Why the arm is in no class, else empty.
         distances: Distance of axes from meeting in one point [m], by their numbers; None if two
             neighbours are parallel.
@@ -79,8 +87,8 @@ class RoundTrip:
     """Result of an IK round trip: tool poses of random postures by Drake, solved by the kernel.
 
     Attributes:
-        method: "closed form", which must recover every posture, or "numeric", which searches for
-            any posture with the same tool pose and may fail.
+        method: "closed form" or "elimination", which must recover every posture, or
+            "numeric", which searches for any posture with the same tool pose and may fail.
         samples: Number of postures, drawn uniformly within the limits.
         recovered: Number of postures that are among the kernel's solutions; numeric: number of
             postures whose tool pose has a solution.
@@ -91,7 +99,7 @@ class RoundTrip:
         rotation_error: Largest orientation error of the tool [rad].
     """
 
-    method: Literal["closed form", "numeric"]
+    method: Literal["closed form", "elimination", "numeric"]
     samples: int
     recovered: int
     solutions: int
@@ -139,7 +147,9 @@ def _six_joint_class(chain: Chain) -> ArmClass:
     except ArmClassError as error:
         return ArmClass(None, str(error), distances, None, joints=6)
     name: ClassName = "six-joint parallel-axes"
-    if is_sliding(arm):
+    if is_general(arm):
+        name = "six-joint elimination"
+    elif is_sliding(arm):
         name = "three prismatic joints"
     elif has_spherical_wrist(arm):
         name = "six-joint spherical-wrist"
@@ -186,8 +196,13 @@ def round_trip(
         if closest <= (np.pi if solver is None else RECOVERED):
             recovered += 1
             joint_error = max(joint_error, closest)
+    method: Literal["closed form", "elimination", "numeric"] = "closed form"
+    if solver is None:
+        method = "numeric"
+    elif isinstance(solver, SixJointArm) and is_general(solver):
+        method = "elimination"
     return RoundTrip(
-        method="numeric" if solver is None else "closed form",
+        method=method,
         samples=samples,
         recovered=recovered,
         solutions=solutions,

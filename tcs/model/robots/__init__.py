@@ -8,16 +8,19 @@ from __future__ import annotations
 
 from tcs.model.robots.arms import BOTH, arm_references
 from tcs.model.robots.extras import robot_urdf
+from tcs.model.robots.hands import robot_of_hand
 from tcs.model.robots.held_tool import holding, load_robot, load_tool, tool_names
 from tcs.model.robots.loading import robot_names
 from tcs.model.robots.primitives import Primitive, read_primitives, union_volume, write_primitives
-from tcs.model.robots.robot_file import RobotFile, joint_limits
+from tcs.model.robots.robot_file import LEAST_JERK, MOST_JERK, RobotFile, joint_limits
 from tcs.model.robots.urdf import Urdf, read_urdf
 from tcs.model.robots.urdf.kinematic import kinematic_urdf
 from tcs.model.robots.urdf.meshes import as_obj
 
 __all__ = [
     "BOTH",
+    "LEAST_JERK",
+    "MOST_JERK",
     "Primitive",
     "RobotFile",
     "Urdf",
@@ -31,6 +34,7 @@ __all__ = [
     "read_primitives",
     "read_urdf",
     "robot_names",
+    "robot_of_hand",
     "robot_urdf",
     "tool_names",
     "union_volume",

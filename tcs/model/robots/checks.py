@@ -192,8 +192,8 @@ def _check_rest(robot: RobotFile, model: Urdf, where: str) -> None:
 
 
 def _check_rates(robot: RobotFile, where: str) -> None:
-    """Check that velocity and acceleration limits are of joints of the arm."""
-    for field in ("velocity_limits", "acceleration_limits"):
+    """Check that limits of velocity, acceleration and jerk are of joints of the arm."""
+    for field in ("velocity_limits", "acceleration_limits", "jerk_limits"):
         for name in getattr(robot, field):
             _check_known_joint(name, robot, f"{where}, field '{field}'")
 

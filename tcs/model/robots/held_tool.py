@@ -124,6 +124,14 @@ def holding(robot: str | Path, tool: str | Path) -> str:
     return HELD.join(parts)
 
 
+def held_parts(name_or_path: str | Path) -> tuple[str | Path, str]:
+    """Return the references of a robot and of the tool that it holds, "" for none."""
+    robot, plus, tool = str(name_or_path).rpartition(HELD)
+    if not plus or not robot or Path(name_or_path).is_file():
+        return name_or_path, ""
+    return robot, tool
+
+
 def load_robot(name_or_path: str | Path) -> RobotFile:
     """Return a robot, checked against its URDF; the paths in it are absolute.
 
@@ -136,8 +144,8 @@ def load_robot(name_or_path: str | Path) -> RobotFile:
         UnknownNameError: If no robot or tool has that name, or the file names something unknown.
         RobotError: If a file, or a model it names, cannot be used.
     """
-    robot, plus, tool = str(name_or_path).rpartition(HELD)
-    if not plus or not robot or Path(name_or_path).is_file():
+    robot, tool = held_parts(name_or_path)
+    if not tool:
         return load_bare_robot(name_or_path)
     held = with_tool(load_bare_robot(robot), load_tool(tool), name=holding(robot, tool))
     check_robot(held, where=f"robot '{robot}' with tool '{tool}'")

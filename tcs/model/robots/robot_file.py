@@ -26,6 +26,9 @@ LEAST_JOINTS, MOST_JOINTS = 6, 7
 """Number of joints that an arm may have."""
 
 Rate = Annotated[float, Field(gt=0.0, le=1000.0)]
+LEAST_JERK, MOST_JERK = 0.1, 1e5
+"""Range of jerk limits [rad/s^3]: an arm takes 40 s to its acceleration at the least one."""
+Jerk = Annotated[float, Field(ge=LEAST_JERK, le=MOST_JERK)]
 ACCELERATION = 2.0
 """Acceleration limit of a joint unless the robot file gives one [rad/s^2]: URDFs have none, and
 this brings an arm to 1 rad/s in half a second, which suits motions next to a person."""
@@ -127,6 +130,8 @@ class RobotFile(Document):
     acceleration_limits: Annotated[Mapping[Name, Rate], Entries] = {}
     """Acceleration limits of joints of the scored arm [rad/s^2]; `ACCELERATION` for those left
     out."""
+    jerk_limits: Annotated[Mapping[Name, Jerk], Entries] = {}
+    """Jerk limits of joints of the scored arm [rad/s^3]; none for those left out."""
     tool_frame: Name
     """T: the frame that moves to the goals; a link of the URDF, or an extra frame or body."""
     torso_joint: Name | None = None
@@ -224,6 +229,10 @@ class RobotFile(Document):
                     "the robot file, field 'velocity_limits' [rad/s]."
                 )
         return velocity, [self.acceleration_limits.get(n, ACCELERATION) for n in self.arm_joints]
+
+    def arm_jerks(self) -> list[float]:
+        """Return the jerk limits of the scored arm [rad/s^3], inf for joints without one."""
+        return [self.jerk_limits.get(name, math.inf) for name in self.arm_joints]
 
     def arm_rest(self) -> list[float]:
         """Return the rest posture of the scored arm within the limits in force [rad].

@@ -134,6 +134,8 @@ def _goals_on(
                 quaternion=X_LG.rotation().ToQuaternion().wxyz(),
                 weight=surface.weight / chosen.size,
                 free=surface.free,
+                arm=surface.arm,
+                tool=surface.tool,
                 approach=surface.approach,
                 retreat=surface.retreat,
             )

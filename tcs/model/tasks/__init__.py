@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from tcs.model.tasks.files import load_task, task_names
 from tcs.model.tasks.freedom import Freedom
+from tcs.model.tasks.hand import Hand
 from tcs.model.tasks.surface import Surface
 from tcs.model.tasks.task import TOOL_SPEED, Goal, KeepOut, Task
 from tcs.model.tasks.tool_line import ToolLine
@@ -15,6 +16,7 @@ __all__ = [
     "TOOL_SPEED",
     "Freedom",
     "Goal",
+    "Hand",
     "KeepOut",
     "Surface",
     "Task",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal
@@ -12,7 +13,7 @@ from pydantic import BeforeValidator, ConfigDict, Field
 
 from tcs.errors import TaskError, UnknownNameError
 from tcs.files.documents import Document, read_document
-from tcs.files.paths import DataFiles
+from tcs.files.paths import DataFiles, expanded, is_path
 from tcs.model.tasks.freedom import Freedom
 from tcs.model.tasks.surface import Surface
 from tcs.model.tasks.task import Goal, KeepOut, Task
@@ -67,6 +68,8 @@ class GoalEntry(_Entry):
     weight: float = 1.0
     name: str = ""
     free: Literal["orientation", "nothing"] | FreeEntry | None = None
+    arm: str = ""
+    tool: str = ""
     approach: LineEntry | None = None
     retreat: LineEntry | None = None
 
@@ -81,6 +84,8 @@ class SurfaceEntry(_Entry):
     facing: list[float] | None = None
     weight: float = 1.0
     free: Literal["orientation", "nothing"] | FreeEntry | None = None
+    arm: str = ""
+    tool: str = ""
     approach: LineEntry | None = None
     retreat: LineEntry | None = None
 
@@ -116,6 +121,7 @@ class TaskFile(_Entry):
     goals: list[GoalEntry] = Field(default_factory=list)
     surface: Annotated[list[SurfaceEntry], BeforeValidator(_listed)] = Field(default_factory=list)
     tool: str = ""
+    tools: dict[str, str] = Field(default_factory=dict)
     free: Literal["orientation", "nothing"] | FreeEntry | None = None
     approach: LineEntry | None = None
     retreat: LineEntry | None = None
@@ -174,6 +180,7 @@ def _read(path: Path) -> Task:
             environments=tuple(written.environments),
             source=written.source,
             tool=written.tool,
+            tools={name: _tool_file(name, tool, path) for name, tool in written.tools.items()},
             allowed_contacts=tuple((pair[0], pair[1]) for pair in written.allowed_contacts),
             surfaces=tuple(surfaces),
             keep_out=tuple(_keep_out(i, entry) for i, entry in enumerate(written.keep_out)),
@@ -209,9 +216,18 @@ def _surface(entry: SurfaceEntry, task: TaskFile) -> Surface:
         facing=None if entry.facing is None else _three(entry.facing, "facing"),
         weight=entry.weight,
         free=_freedom(entry.free if entry.free is not None else task.free),
+        arm=entry.arm,
+        tool=entry.tool,
         approach=approach,
         retreat=retreat,
     )
+
+
+def _tool_file(name: str, tool: str, task: Path) -> str:
+    """Return the name of a tool that ships, or the absolute path of a tool file beside a task."""
+    if not is_path(tool):
+        return tool
+    return os.path.realpath(task.parent / expanded(tool, f"field 'tools.{name}'", TaskError))
 
 
 def _goal(entry: GoalEntry, task: TaskFile) -> Goal:
@@ -223,6 +239,8 @@ def _goal(entry: GoalEntry, task: TaskFile) -> Goal:
         weight=entry.weight,
         name=entry.name,
         free=_freedom(entry.free if entry.free is not None else task.free),
+        arm=entry.arm,
+        tool=entry.tool,
         approach=approach,
         retreat=retreat,
     )

@@ -45,6 +45,10 @@ class Surface:
     """Weight of all its goals together, relative to those of the task."""
     free: Freedom | None = None
     """What is free about each goal."""
+    arm: str = ""
+    """Name of the arm that reaches the goals, as for a goal."""
+    tool: str = ""
+    """Name of the tool that they need, as for a goal."""
     approach: ToolLine = DEFAULT_APPROACH
     """Straight motion that ends at each goal."""
     retreat: ToolLine = DEFAULT_RETREAT

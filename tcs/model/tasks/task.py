@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tcs.errors import TaskError, UnknownNameError
 from tcs.files.quantities import GOALS, SIZE, WEIGHT
 from tcs.model.tasks.freedom import Freedom
+from tcs.model.tasks.hand import Hand
 from tcs.model.tasks.surface import Surface
 from tcs.model.tasks.tool_line import (
     DEFAULT_APPROACH,
@@ -82,6 +83,10 @@ class Goal:
     """Where the goal is, as people say it, e.g. "left cheek"; "" for no name."""
     free: Freedom | None = None
     """Tool poses that serve as well as the nominal one, None for none."""
+    arm: str = ""
+    """Name of the arm that reaches it, as the robot file names its arms; "" for the scored one."""
+    tool: str = ""
+    """Name of the tool that it needs, one of `Task.tools` or one that ships; "" for none."""
 
     def __post_init__(self) -> None:
         """Check each value, normalise the quaternion, and make the arrays read-only.
@@ -129,7 +134,7 @@ class Goal:
     def _key(self) -> tuple[object, ...]:
         position, quaternion = self.position.tolist(), self.quaternion.tolist()
         others = (self.weight, self.approach, self.retreat, self.name, self.free)
-        return (self.body_frame, *position, *quaternion, *others)
+        return (self.body_frame, *position, *quaternion, *others, self.arm, self.tool)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -149,6 +154,8 @@ class Task:
     """Source of the numbers."""
     tool: str = ""
     """Description of the tool frame that the goals refer to."""
+    tools: Mapping[str, str] = field(default_factory=dict, hash=False)
+    """Tools of its own that goals may name: name or path of the tool file, by the name in goals."""
     allowed_contacts: tuple[tuple[str, str], ...] = ()
     """Pairs (robot body, environment body) that may touch."""
     keep_out: tuple[KeepOut, ...] = ()
@@ -195,6 +202,14 @@ class Task:
         """Weight of each goal, summing to 1, shape (goals,)."""
         raw = np.array([goal.weight for goal in self.goals], dtype=np.float64)
         return np.asarray(raw / raw.sum(), dtype=np.float64)
+
+    def goals_by_hand(self) -> dict[Hand, tuple[int, ...]]:
+        """Return the numbers of the goals of each hand, in the order of the first of them."""
+        found: dict[Hand, tuple[int, ...]] = {}
+        for number, goal in enumerate(self.goals):
+            hand = Hand(goal.arm, goal.tool)
+            found[hand] = (*found.get(hand, ()), number)
+        return found
 
     @property
     def has_freedom(self) -> bool:

@@ -1,4 +1,4 @@
-"""Figures of base poses from above: short lines from the base position along its heading."""
+"""Figures of base poses from above: heat maps of the best score at each base position."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+
+from tcs.output.draw.heat_map import heat_map_of
 
 FloatArray = NDArray[np.float64]
 
@@ -25,8 +26,8 @@ class BasePoseView:
 
     poses: FloatArray
     """x, y [m], yaw [rad] and score of each, shape (n, 4)."""
-    length: float
-    """Length of the lines [m]."""
+    step: float
+    """Distance of neighbouring base positions [m]."""
     positions: FloatArray
     """Tool positions, x, y [m], shape (m, 2)."""
     grasps: FloatArray
@@ -45,8 +46,8 @@ def draw_base_poses(views: Sequence[BasePoseView], *, title: str, score: str = "
         score: Label of the colour bar.
 
     Source:
-        ITCM thesis, Figures 3, 5 and 37: a line starts at the base position and points
-        along the heading of the robot; its colour is the score.
+        ITCM thesis, Figures 3, 5 and 37, which draw a line for each base pose, so that those of
+        one position hide each other; here a cell has the colour of the best one.
     """
     figure = Figure(figsize=(5.6 * len(views) + 0.9, 6.2), layout="constrained")
     panels = figure.subplots(1, len(views), squeeze=False)[0]
@@ -56,7 +57,7 @@ def draw_base_poses(views: Sequence[BasePoseView], *, title: str, score: str = "
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
     bar = ScalarMappable(Normalize(0.0, 1.0), COLOURS)
-    figure.colorbar(bar, ax=list(panels), label=score, shrink=0.8)
+    figure.colorbar(bar, ax=list(panels), label=f"{score}, best heading", shrink=0.8)
     figure.suptitle(title, fontsize=13)
     return figure
 
@@ -68,14 +69,11 @@ def _extent(views: Sequence[BasePoseView]) -> tuple[FloatArray, FloatArray]:
 
 
 def _draw(axes: Axes, view: BasePoseView) -> None:
-    # The best last, on top of the others.
-    poses = view.poses[np.argsort(view.poses[:, 3], kind="stable")]
-    start = poses[:, :2]
-    ahead = np.column_stack([np.cos(poses[:, 2]), np.sin(poses[:, 2])])
-    lines = np.stack([start, start + view.length * ahead], axis=1)
-    drawn = LineCollection(list(lines), cmap=COLOURS, norm=Normalize(0.0, 1.0), linewidths=1.1)
-    drawn.set_array(poses[:, 3])
-    axes.add_collection(drawn)
+    found = heat_map_of(view.poses, view.step)
+    # An image in vector formats too: cells beside each other would show seams.
+    axes.pcolormesh(
+        *found.edges, found.best, cmap=COLOURS, norm=Normalize(0.0, 1.0), rasterized=True
+    )
     for x, y, heading in view.grasps:
         _draw_gripper(axes, x, y, heading)
     axes.plot(*view.positions.T, "o", ms=7, mfc="white", mec="black", mew=1.3, zorder=5)

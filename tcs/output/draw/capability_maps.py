@@ -16,9 +16,6 @@ from tcs.kernel.arrays import FloatArray
 from tcs.output.draw.base_poses import BasePoseView, draw_base_poses
 
 _BEST, _WORST = "#c0007a", "#404040"
-LINE_STEPS = 0.42
-"""Length of a line in steps of the grid: neighbouring lines do not touch."""
-
 _BEYOND = 1e6
 """Cell coordinates of this magnitude are beyond every map."""
 
@@ -46,7 +43,7 @@ def task_view(found: TaskMap) -> BasePoseView:
     )
     return BasePoseView(
         poses=poses,
-        length=LINE_STEPS * found.grid.step,
+        step=found.grid.step,
         positions=np.array([(p.x, p.y) for p in found.task.positions]),
         grasps=np.array(grasps, dtype=np.float64).reshape(-1, 3),
         caption=caption,
@@ -66,20 +63,42 @@ def map_figure(capability: CapabilityMap, *, tilt: int = 0, height: float | None
         UnknownNameError: If the grid has no such tilt.
         SelectionError: If the map has no base pose there, or the height is not finite.
     """
+    view = map_view(capability, tilt=tilt, height=height)
+    return draw_base_poses([view], title=map_title(capability))
+
+
+def map_title(capability: CapabilityMap) -> str:
+    """Return the title of a map: its type and its robot."""
+    # A robot of the user's own is stored by the path of its file.
+    robot = Path(str(capability.metadata.get("robot", ""))).stem
+    return f"{capability.map_type} of {robot}, relative to the tool"
+
+
+def map_view(
+    capability: CapabilityMap, *, tilt: int = 0, height: float | None = None
+) -> BasePoseView:
+    """Return the panel of the base poses of one tilt and height, relative to the tool.
+
+    Args:
+        capability: The map.
+        tilt: Number of the tilt.
+        height: Height of the tool above the floor [m]; None is the height with most cells.
+
+    Raises:
+        UnknownNameError: If the grid has no such tilt.
+        SelectionError: If the map has no base pose there, or the height is not finite.
+    """
     poses, drawn = layer(capability, tilt=tilt, height=height)
     pitch, roll = (math.degrees(n * capability.grid.yaw_step) for n in capability.grid.tilts[tilt])
     tool = f"tool at {drawn:.2f} m, pitch {pitch:g} deg, roll {roll:g} deg"
     conditions = f"{tool}, torso height {capability.torso_height:.2f} m"
-    view = BasePoseView(
+    return BasePoseView(
         poses=poses,
-        length=LINE_STEPS * capability.grid.step,
+        step=capability.grid.step,
         positions=np.zeros((1, 2)),
         grasps=np.zeros((1, 3)) if pitch == 0.0 else np.zeros((0, 3)),
         caption=f"{len(poses):,} base poses\n{conditions}",
     )
-    # A robot of the user's own is stored by the path of its file.
-    robot = Path(str(capability.metadata.get("robot", ""))).stem
-    return draw_base_poses([view], title=f"{capability.map_type} of {robot}, relative to the tool")
 
 
 def layer(

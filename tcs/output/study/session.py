@@ -153,7 +153,8 @@ class StudySession:
         return participant.is_active and not participant.steps
 
     def close(self) -> None:
-        """Stop the server of the forms."""
+        """Stop the server of the forms, and that of the live page."""
+        self._close_trials()
         if self._forms is not None:
             self._forms.finish()
             self._forms.close()
@@ -212,7 +213,7 @@ class StudySession:
             return False
         if self._trials is None or self._trials[0] != condition:
             # The page of the condition before is closed first: its port is free again.
-            self._trials = None
+            self._close_trials()
             session = TrialSession(study, condition, port=screen.port, on_stop=screen.note)
             self._trials = condition, session
             screen.show(session.url)
@@ -225,6 +226,11 @@ class StudySession:
             return False
         self._report_trial(step, self._recording.record_run(run))
         return True
+
+    def _close_trials(self) -> None:
+        if self._trials is not None:
+            self._trials[1].close()
+        self._trials = None
 
     def _fill_in(self, step: Step, screen: Screen) -> bool:
         """Wait until a form is filled in; return whether it is."""

@@ -67,4 +67,5 @@ def report_plan_check(result: Mapping[str, Any]) -> None:
         f"{result['jumps']} jumps; {result['goals']} goals, tool within "
         f"{result['max_position_error']:.1e} m; at most {result['velocity']:.1%} of the velocity "
         f"limits and {result['acceleration']:.1%} of the acceleration limits"
+        + ("" if result["jerk"] is None else f", {result['jerk']:.1%} of the jerk limits")
     )

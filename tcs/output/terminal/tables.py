@@ -171,6 +171,8 @@ def report_rows(result: Mapping[str, Any]) -> None:
 def report_choice(result: Mapping[str, Any]) -> None:
     """Print a selected set."""
     out = results_console()
+    if result["here_place"]:
+        out.print(f"Now: {place_in_line(result['here_place'])}.")
     for line in stop_places(result["places"]):
         out.print(line)
     out.print(members_table(result["members"]))

@@ -1,78 +1,79 @@
-"""Capability maps and task maps as pictures or interactive pages."""
+"""Capability maps and task maps as pictures, or as pages that show the headings under the pointer.
+
+A page is one file: it loads nothing, and needs no server.
+"""
 
 from __future__ import annotations
 
+import html
+import json
+import math
+from collections.abc import Sequence
+from importlib.resources import files
 from pathlib import Path
 
 import matplotlib
 import numpy as np
-from pydrake.geometry import Box, Meshcat, Rgba, Sphere
-from pydrake.math import RigidTransform, RotationMatrix
+from matplotlib.colors import to_hex
 
 from tcs.capability.map import CapabilityMap
 from tcs.capability.merge import TaskMap
 from tcs.files.writing import whole_file
 from tcs.kernel.arrays import FloatArray
 from tcs.output.draw import save_figure
-from tcs.output.draw.base_poses import COLOURS
-from tcs.output.draw.capability_maps import LINE_STEPS, layer, map_figure, task_figure
-from tcs.output.view.live import open_meshcat
+from tcs.output.draw.base_poses import COLOURS, BasePoseView
+from tcs.output.draw.capability_maps import map_figure, map_title, map_view, task_figure, task_view
+from tcs.output.draw.heat_map import headings_at
 
-_SHADES = 16
-"""Number of colours: Meshcat draws line segments of one colour at a time."""
-_ABOVE_FLOOR = 0.005
-"""Height of the lines [m]."""
-_EYE = np.array([-1.3, -1.3, 1.5])
-"""Initial camera position relative to the centre of the base poses [m]."""
-_GREY = Rgba(0.92, 0.92, 0.9, 1.0)
-_PURPLE = Rgba(0.48, 0.25, 0.63, 1.0)
+_SHADES = 64
+"""Number of colours of a page."""
+_DIGITS = 3
 
 
-def write_page(
-    path: Path,
-    poses: FloatArray,
-    *,
-    length: float,
-    tools: list[tuple[FloatArray, FloatArray]],
-    best: FloatArray | None = None,
-) -> None:
-    """Write an interactive page: base poses as lines on the floor, tools as grippers.
+def write_page(path: Path, view: BasePoseView, *, title: str) -> None:
+    """Write an interactive page: a heat map, and the headings of the position under the pointer.
 
     Args:
         path: The page to write.
-        poses: x, y [m], yaw [rad] and score, shape (n, 4).
-        length: Length of the lines [m].
-        tools: Orientation (3, 3) and position (3,) [m] of each tool.
-        best: x, y, yaw of a base pose to highlight, or None.
+        view: What it shows.
+        title: Its title.
 
     Raises:
-        OutputError: If Meshcat finds no free port, or the page cannot be written.
+        OutputError: If it cannot be written.
     """
-    meshcat = open_meshcat()
-    meshcat.SetProperty("/Grid", "visible", False)
-    middle = np.append(0.5 * (poses[:, :2].min(axis=0) + poses[:, :2].max(axis=0)), 0.2)
-    meshcat.SetCameraPose(middle + _EYE, middle)
-    meshcat.SetObject("floor", Box(6.0, 6.0, 0.01), _GREY)
-    meshcat.SetTransform("floor", RigidTransform([0.0, 0.0, -0.01]))
-    start = np.column_stack([poses[:, :2], np.full(len(poses), _ABOVE_FLOOR)])
-    ahead = np.column_stack([np.cos(poses[:, 2]), np.sin(poses[:, 2]), np.zeros(len(poses))])
-    shade = np.clip((poses[:, 3] * _SHADES).astype(int), 0, _SHADES - 1)
-    colours = matplotlib.colormaps[COLOURS]
-    for k in np.unique(shade):
-        rows = shade == k
-        colour = Rgba(*(float(c) for c in colours((k + 0.5) / _SHADES)))
-        end = start[rows] + length * ahead[rows]
-        meshcat.SetLineSegments(f"base poses/{k}", start[rows].T, end.T, 2.0, colour)
-    for i, (R, p) in enumerate(tools):
-        _add_gripper(meshcat, f"tools/{i}", RigidTransform(RotationMatrix(R), p))
-    if best is not None:
-        x, y, yaw = best
-        meshcat.SetObject("best", Box(0.16, 0.03, 0.03), Rgba(0.75, 0.0, 0.48, 1.0))
-        R_WB = RotationMatrix.MakeZRotation(yaw)
-        centre = np.array([x, y, 0.02]) + R_WB.matrix() @ [0.08, 0.0, 0.0]
-        meshcat.SetTransform("best", RigidTransform(R_WB, centre))
+    best = view.poses[np.argmax(view.poses[:, 3])]
+    content = json.dumps(
+        {
+            "step": view.step,
+            "cells": _cells(view),
+            "tools": np.round(view.positions, _DIGITS).tolist(),
+            "grippers": [_pose(grasp) for grasp in view.grasps],
+            "best": _pose(best[:3]),
+            "colours": [
+                to_hex(colour)
+                for colour in matplotlib.colormaps[COLOURS](np.linspace(0, 1, _SHADES))
+            ],
+        }
+    )
+    page = files("tcs.output.view").joinpath("base_poses.html").read_text(encoding="utf-8")
+    caption = html.escape(view.caption.replace("\n", "; "))
+    page = page.replace("{title}", html.escape(title)).replace("{caption}", caption)
     with whole_file(path, "Page") as stream:
-        stream.write(meshcat.StaticHtml().encode())
+        stream.write(page.replace("{content}", content).encode())
+
+
+def _cells(view: BasePoseView) -> list[list[object]]:
+    """Return x and y in steps, and headings [deg] with their scores, of each base position."""
+    return [
+        [x, y, [[yaw, round(score, _DIGITS)] for yaw, score in found]]
+        for (x, y), found in sorted(headings_at(view.poses, view.step).items())
+    ]
+
+
+def _pose(pose: Sequence[float] | FloatArray) -> list[float]:
+    """Return x, y [m] and heading [deg] of a pose."""
+    x, y, yaw = (float(value) for value in pose)
+    return [round(x, _DIGITS), round(y, _DIGITS), round(math.degrees(yaw), _DIGITS)]
 
 
 def save_task_map(path: Path, task_map: TaskMap) -> None:
@@ -88,19 +89,7 @@ def save_task_map(path: Path, task_map: TaskMap) -> None:
     if path.suffix != ".html":
         save_figure(path, task_figure(task_map))
         return
-    tools = [
-        (grasp.R_FT, np.array([p.x, p.y, p.height]))
-        for p in task_map.task.positions
-        for grasp in p.grasps
-    ]
-    best = task_map.best()
-    write_page(
-        path,
-        task_map.base_poses[:, [0, 1, 2, 4]],
-        length=LINE_STEPS * task_map.grid.step,
-        tools=tools,
-        best=np.array([best.x, best.y, best.yaw]),
-    )
+    write_page(path, task_view(task_map), title=task_map.task.name)
 
 
 def save_map_layer(
@@ -122,19 +111,5 @@ def save_map_layer(
     if path.suffix != ".html":
         save_figure(path, map_figure(capability, tilt=tilt, height=height))
         return
-    poses, drawn = layer(capability, tilt=tilt, height=height)
-    tools = [(capability.grid.R_ET[tilt], np.array([0.0, 0.0, drawn]))]
-    write_page(path, poses, length=LINE_STEPS * capability.grid.step, tools=tools)
-
-
-def _add_gripper(meshcat: Meshcat, name: str, X_FT: RigidTransform) -> None:
-    """Add two fingers, a palm and a dot between the fingers."""
-    parts = {
-        "left": (Box(0.07, 0.008, 0.02), [-0.015, 0.04, 0.0]),
-        "right": (Box(0.07, 0.008, 0.02), [-0.015, -0.04, 0.0]),
-        "palm": (Box(0.02, 0.088, 0.02), [-0.06, 0.0, 0.0]),
-        "middle": (Sphere(0.008), [0.0, 0.0, 0.0]),
-    }
-    for part, (shape, p_TPo) in parts.items():
-        meshcat.SetObject(f"{name}/{part}", shape, _PURPLE)
-        meshcat.SetTransform(f"{name}/{part}", X_FT @ RigidTransform(p_TPo))
+    view = map_view(capability, tilt=tilt, height=height)
+    write_page(path, view, title=map_title(capability))

@@ -9,7 +9,8 @@ from typing import Any
 
 from tcs.files.writing import whole_file
 from tcs.model.grid import InitialConfiguration
-from tcs.output.report.score.pictures import scored_scene, title_of
+from tcs.output.report.score.pictures import title_of
+from tcs.output.report.score.scored_scenes import scored_scene
 from tcs.output.report.score.shown_set import ShownSet
 from tcs.output.view.export import export_page
 from tcs.output.view.live import Viewer, open_meshcat, stay_open

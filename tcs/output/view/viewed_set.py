@@ -17,8 +17,12 @@ from tcs.output.words import (
     assign_goals,
     assigned_goals,
     goal_list,
+    goal_names,
     goals_by_reason,
+    goals_text,
     pair_text,
+    place_in_line,
+    place_of_state,
 )
 from tcs.placement.refinement import RefinedMembers
 from tcs.placement.store import ScoreFile
@@ -42,6 +46,10 @@ class ConfigurationResult:
     """P_R of the configuration by itself, TCS eq. (1)."""
     manipulability: float
     """P_M of the configuration by itself, TCS eq. (4)."""
+    names: tuple[str, ...] = ()
+    """Names of all goals, "" for one without; () if they are not known."""
+    place: str = ""
+    """Where the base is relative to the person, as a sentence; "" without a person."""
 
     @property
     def reached(self) -> tuple[int, ...]:
@@ -54,7 +62,9 @@ class ConfigurationResult:
         Args:
             goal: The goal that is shown, which comes first.
         """
-        return f"goal {goal} {self._goal_text(goal)}; {self.summary}"
+        place = [place_in_line(self.place)] if self.place else []
+        of_goal = f"{goals_text((goal,), self.names)} {self._goal_text(goal)}"
+        return "; ".join([*place, of_goal, self.summary])
 
     @property
     def summary(self) -> str:
@@ -64,7 +74,9 @@ class ConfigurationResult:
             f"P_R {self.reachability:.0%}, P_M {self.manipulability:.3f}"
         )
         missed = goals_by_reason(self.reasons).items()
-        rest = [f"{REASON_NAMES[reason]}: {goal_list(goals)}" for reason, goals in missed]
+        rest = [
+            f"{REASON_NAMES[reason]}: {goal_list(goals, self.names)}" for reason, goals in missed
+        ]
         return "; ".join([scores, *rest])
 
     def _goal_text(self, goal: int) -> str:
@@ -92,12 +104,18 @@ class ViewedSet:
     indices from `grid.size`."""
     origin: tuple[int, ...] = ()
     """Flat indices of the configurations of the grid that they were refined from."""
+    file: ScoreFile | None = None
+    """The score file, which knows the names of the goals and where the person is; None if only the
+    table is known."""
+    table: int = 0
+    """Number of the state table in it."""
 
     @classmethod
     def of(cls, file: ScoreFile, table: int, members: tuple[int, ...]) -> ViewedSet:
         """Return a set of a state table of a file."""
         found = file.tables[table]
-        return cls(Grid.from_dict(file.grid), found.scores, members, found.success)
+        grid = Grid.from_dict(file.grid)
+        return cls(grid, found.scores, members, found.success, file=file, table=table)
 
     @classmethod
     def of_shown(cls, shown: ShownSet) -> ViewedSet:
@@ -107,7 +125,10 @@ class ViewedSet:
         found, grid = shown.file.tables[shown.table], Grid.from_dict(shown.file.grid)
         members = tuple(grid.size + i for i in range(len(shown.members)))
         refined = RefinedMembers(shown.members, shown.scores)
-        return cls(grid, found.scores, members, found.success, refined, shown.indices)
+        return cls(
+            grid, found.scores, members, found.success, refined, shown.indices,
+            file=shown.file, table=shown.table,
+        )  # fmt: skip
 
     def configuration(self, index: int) -> InitialConfiguration:
         """Return a configuration of the grid, or a member of a refined set."""
@@ -148,6 +169,8 @@ class ViewedSet:
             pairs=tuple(names[i] if i >= 0 else None for i in scores.pair[row].tolist()),
             reachability=float(tc_reachability(scores.reached[row], scores.weights)),
             manipulability=float(tc_manipulability(scores.dexterity[row], scores.weights)),
+            names=() if self.file is None else goal_names(self.file.task, self.goals),
+            place="" if self.file is None else place_of_state(self.file, self.table, configuration),
         )
 
     def joints(self, index: int, goal: int) -> NDArray[np.float32] | None:

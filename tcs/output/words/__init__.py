@@ -40,6 +40,7 @@ from tcs.output.words.places import (
     frames_of_state,
     member_places,
     place_in_line,
+    place_of_state,
     relative_place,
     stop_places,
 )
@@ -88,6 +89,7 @@ __all__ = [
     "percentage",
     "person_text",
     "place_in_line",
+    "place_of_state",
     "quantity",
     "reason_of",
     "relative_place",

@@ -9,26 +9,35 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from tcs.output.words.goals import goal_names
-from tcs.output.words.places import member_places
+from tcs.output.words.places import member_places, place_of_state
 
 if TYPE_CHECKING:
+    from tcs.model.grid import InitialConfiguration
     from tcs.placement import selection
     from tcs.placement.reasons import Explanation
     from tcs.placement.store import ScoreFile
 
 
-def choice_in_words(file: ScoreFile, choice: selection.Choice) -> dict[str, Any]:
+def choice_in_words(
+    file: ScoreFile, choice: selection.Choice, here: InitialConfiguration
+) -> dict[str, Any]:
     """Return a choice as plain containers.
 
     Args:
         file: The score file that it was selected from.
         choice: The choice.
+        here: The current state that it was selected for.
 
     Returns:
-        What `Choice.to_json` returns; and `places`, in each alternative too: where each member is
-        relative to the person, in the order of the tour, "" without a person.
+        What `Choice.to_json` returns; `here_place`, where the base is now relative to the person;
+        and `places`, in each alternative too: where each member is, in the order of the tour. They
+        are "" without a person.
     """
-    result = {**choice.to_json(file.metadata["measure"]), "places": _places(file, choice)}
+    result = {
+        **choice.to_json(file.metadata["measure"]),
+        "here_place": place_of_state(file, choice.match.index if choice.match else 0, here),
+        "places": _places(file, choice),
+    }
     if choice.alternatives:
         result["alternatives"] = [
             {**one, "places": _places(file, other)}

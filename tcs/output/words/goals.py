@@ -21,18 +21,32 @@ def goal_names(task: Mapping[str, Any], goals: int) -> tuple[str, ...]:
 
     Returns:
         The name of each goal; for a goal without one, its body frame and its number among the goals
-        there, from 1; "" where the task states neither.
+        there, from 1; "" where the task states neither. The arm and the tool that a goal names
+        follow.
 
     >>> on_head = {"body_frame": "head"}
     >>> goal_names({"goals": [on_head, {"name": "chin", **on_head}, on_head]}, 3)
     ('head, place 1', 'chin', 'head, place 3')
+    >>> goal_names({"goals": [{"name": "chin", "arm": "left", "tool": "razor"}]}, 1)
+    ('chin [left arm with razor]',)
     """
     frames = [text_of_goal(task, goal, "body_frame") for goal in range(goals)]
     names = []
     for goal, frame in enumerate(frames):
         on_frame = f"{frame_name(frame)}, place {frames[: goal + 1].count(frame)}" if frame else ""
-        names.append(text_of_goal(task, goal, "name") or on_frame)
+        name = text_of_goal(task, goal, "name") or on_frame
+        hand = hand_text(text_of_goal(task, goal, "arm"), text_of_goal(task, goal, "tool"))
+        names.append(f"{name} [{hand}]".strip() if hand else name)
     return tuple(names)
+
+
+def hand_text(arm: str | None, tool: str | None) -> str:
+    """Return an arm and a tool in words, "" without either.
+
+    >>> hand_text("left", "razor"), hand_text("right", None), hand_text(None, "spoon")
+    ('left arm with razor', 'right arm', 'spoon')
+    """
+    return " with ".join(part for part in (f"{arm} arm" if arm else "", tool) if part)
 
 
 def text_of_goal(task: Mapping[str, Any], goal: int, key: str) -> str | None:

@@ -168,6 +168,24 @@ def member_places(
     return texts
 
 
+def place_of_state(file: ScoreFile, table: int, here: InitialConfiguration) -> str:
+    """Return where a base that need not be on the grid is relative to the person; "" without one.
+
+    The person is where the scored state of the environment nearest to the stated one has them.
+
+    Args:
+        file: A score file.
+        table: Number of the table.
+        here: The state of robot and environment; axes that it lacks count as at their first value.
+    """
+    grid, now, state = file.configurations, dict(here.environment), 0
+    for axis in grid.environment_axes:
+        away = [abs(axis.value(i) - now.get(axis.name, axis.value(0))) for i in range(axis.count)]
+        state = state * axis.count + away.index(min(away))
+    person = _person_of(file, table, state)
+    return "" if person is None else person.place(here.base_x, here.base_y, here.base_yaw).text
+
+
 def _person_of(file: ScoreFile, table: int, state: int) -> PersonOnFloor | None:
     """Return where the person is in a state of the environment; kept with the table."""
     kept = file.tables[table].derived.setdefault("persons on the floor", {})

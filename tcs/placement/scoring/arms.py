@@ -50,7 +50,7 @@ def score_arms(
     size = first.job.scored_grid.size
     parts = {
         arm: setup.scored(
-            on_progress=_shifted(on_progress, number * size, len(setups) * size),
+            on_progress=shifted(on_progress, number * size, len(setups) * size),
             on_compile=on_compile,
         )
         for number, (arm, setup) in enumerate(setups.items())
@@ -64,28 +64,55 @@ def score_arms(
 
 def joined(tables: Sequence[ScoreTable]) -> ScoreTable:
     """Return the scores of several arms as one table, those of the first arm first."""
+    rows = [table.configurations for table in tables]
+    begins = np.cumsum([0, *rows[:-1]]).tolist()
+    every = list(range(tables[0].goals))
+    return filled(
+        tables,
+        [(begin, every) for begin in begins],
+        (sum(rows), tables[0].goals),
+        weights=tables[0].weights,
+        joints_of=lambda _: np.concatenate([table.arm_joints for table in tables]),
+    )
+
+
+def filled(
+    tables: Sequence[ScoreTable],
+    places: Sequence[tuple[int, Sequence[int]]],
+    shape: tuple[int, int],
+    *,
+    weights: NDArray[np.float64],
+    joints_of: Callable[[NDArray[np.uint8]], NDArray[np.float32]],
+) -> ScoreTable:
+    """Return one table that holds the scores of several.
+
+    Args:
+        tables: The tables.
+        places: First row and columns of each in the table to return; together they fill it.
+        shape: Numbers of rows and columns of that table.
+        weights: Weights of its goals, sum 1, shape (goals,).
+        joints_of: Returns the joints of all its reached pairs [rad], given its reasons.
+    """
     names = tuple(dict.fromkeys(pair for table in tables for pair in table.pair_names))
     number = {pair: i for i, pair in enumerate(names)}
-    shape = (sum(table.configurations for table in tables), tables[0].goals)
     dexterity: NDArray[np.float32] = large_zeros(shape, np.float32)
     reason: NDArray[np.uint8] = large_zeros(shape, np.uint8)
     pair: NDArray[np.int32] = large_zeros(shape, np.int32)
-    begin = 0
-    for table in tables:
+    for table, (begin, columns) in zip(tables, places, strict=True):
         # The last entry stands for -1, no contact.
         renumbered = np.array([*(number[pair] for pair in table.pair_names), -1], dtype=np.int32)
+        at = list(columns)
         for rows in chunks(table.dexterity, table.reason, table.pair, dexterity, reason, pair):
             to = slice(begin + rows.start, begin + rows.stop)
-            dexterity[to], reason[to] = table.dexterity[rows], table.reason[rows]
-            pair[to] = renumbered[table.pair[rows]]
-        begin += table.configurations
+            dexterity[to, at], reason[to, at] = table.dexterity[rows], table.reason[rows]
+            pair[to, at] = renumbered[table.pair[rows]]
     return ScoreTable(
         dexterity=dexterity,
         reason=reason,
         pair=pair,
         pair_names=names,
-        arm_joints=np.concatenate([table.arm_joints for table in tables]),
-        weights=tables[0].weights,
+        arm_joints=joints_of(reason),
+        weights=weights,
     )
 
 
@@ -122,7 +149,7 @@ def _constraints(entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return {CONSTRAINTS: {**found[0], "excluded": sum(entry["excluded"] for entry in found)}}
 
 
-def _shifted(
+def shifted(
     on_progress: Callable[[int, int], None] | None, done: int, total: int
 ) -> Callable[[int, int], None] | None:
     """Return a report of progress that counts from `done` to `total`."""

@@ -6,13 +6,13 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
-from tcs.errors import TaskError
+from tcs.errors import TaskError, UnknownNameError
 from tcs.files.paths import data_reference
 from tcs.model.grid import Axis, Grid, restricted
 from tcs.model.people import PersonLike
-from tcs.model.robots import RobotFile, load_robot
+from tcs.model.robots import RobotFile, load_robot, load_tool, robot_of_hand, tool_names
 from tcs.model.scene import (
     EnvironmentFile,
     LoweredScene,
@@ -25,11 +25,28 @@ from tcs.model.scene import (
     with_person,
     with_surface_goals,
 )
-from tcs.model.tasks import Task, load_task
+from tcs.model.tasks import Hand, Task, load_task
 from tcs.placement.constraints import Constraints, kept_conditions
 from tcs.placement.scoring.obstacles import with_obstacles
 
 _NO_CONSTRAINTS = Constraints()
+BARE = Hand()
+"""The hand of goals that name neither arm nor tool."""
+
+
+class JobOptions(TypedDict, total=False):
+    """What of a scene is scored, and with whom."""
+
+    only: Sequence[str]
+    """Conditions on axes of the grid, e.g. "head_rest >= 35 deg"; other values are not scored."""
+    constraints: Constraints
+    """Further conditions, axes that keep their present value, forbidden regions and obstacles.
+    Preferences have no effect."""
+    now: Mapping[str, float] | None
+    """Present values of axes [m or rad], for the axes to keep."""
+    person: PersonLike | None
+    """Whose body the person has, as for `tcs.model.people.load_person`; by default that of the
+    environment file. Goals on the person are moved to that body."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,11 +57,17 @@ class Job:
     spec: SceneSpec
     grid: Grid
     """The configurations to choose from."""
+    given_robot: RobotFile
+    """The robot as it was given, without the hand that the goals name."""
     observed: tuple[Axis, ...] = ()
     """The axes that can only be observed; each of their states is scored into tables of its own."""
     constraints: Constraints = _NO_CONSTRAINTS
     """Constraints whose conditions and obstacles are part of `grid` and `spec` already; forbidden
     regions are applied when scoring."""
+    hand: Hand = BARE
+    """The arm and the tool that the goals name."""
+    goal_numbers: tuple[int, ...] = ()
+    """Numbers of the goals in a task whose goals name several hands; () for a whole task."""
 
     @property
     def scored_grid(self) -> Grid:
@@ -73,11 +96,7 @@ def load_job(
     task: str | Path | Task,
     environment: str | Path | EnvironmentFile,
     robot: str | Path | RobotFile,
-    *,
-    only: Sequence[str] = (),
-    constraints: Constraints = _NO_CONSTRAINTS,
-    now: Mapping[str, float] | None = None,
-    person: PersonLike | None = None,
+    **options: Unpack[JobOptions],
 ) -> Job:
     """Load a task, an environment and a robot, check them against each other and return their job.
 
@@ -85,27 +104,51 @@ def load_job(
         task: Name of a task, path of a task file, or a task.
         environment: Name of an environment, path of its file, or an environment.
         robot: Name of a robot, path of its file, or a robot.
-        only: Conditions on axes of the grid, e.g. "head_rest >= 35 deg"; other values are not
-            scored.
-        constraints: Further conditions, axes that keep their present value, forbidden regions and
-            obstacles. Preferences have no effect.
-        now: Present values of axes [m or rad], for the axes to keep.
-        person: Whose body the person has, as for `tcs.model.people.load_person`; by default that of
-            the environment file. Goals on the person are moved to that body.
+        **options: See `JobOptions`.
 
     Raises:
-        UnknownNameError: If a task, environment, robot, axis or body measure of that name does not
-            exist.
+        TaskError: If the goals of the task name several hands.
+        TcsError: As `load_jobs`.
+    """
+    jobs = load_jobs(task, environment, robot, **options)
+    if len(jobs) > 1:
+        raise TaskError(
+            f"This needs goals of one hand, but those of task '{jobs[0].task.name}' name "
+            f"{len(jobs)}: {'; '.join(str(job.hand) for job in jobs)}. Score the whole task with "
+            "`tcs score`, or write a task of the goals of one hand."
+        )
+    return jobs[0]
+
+
+def load_jobs(
+    task: str | Path | Task,
+    environment: str | Path | EnvironmentFile,
+    robot: str | Path | RobotFile,
+    **options: Unpack[JobOptions],
+) -> tuple[Job, ...]:
+    """Return the job of each hand that the goals of a task name, one if they name none.
+
+    Args:
+        task: Name of a task, path of a task file, or a task.
+        environment: Name of an environment, path of its file, or an environment.
+        robot: Name of a robot, path of its file, or a robot.
+        **options: See `JobOptions`.
+
+    Raises:
+        UnknownNameError: If a task, environment, robot, arm, tool, axis or body measure of that
+            name does not exist.
         DataFileError: If a file cannot be used, or the task is not for that environment.
+        RobotError: If goals name an arm of a robot without several.
         GridError: If the grid is empty or enormous, or a condition is invalid.
         SelectionError: If the present value of an axis to keep is missing or not scored.
     """
     task = task if isinstance(task, Task) else load_task(task)
     if not isinstance(environment, EnvironmentFile):
         environment = load_environment(environment)
+    person = options.get("person")
     if person is not None:
         environment = with_person(environment, person)
-    robot = robot if isinstance(robot, RobotFile) else load_robot(robot)
+    given = robot if isinstance(robot, RobotFile) else load_robot(robot)
     # An environment of the user's own may take any task whose body frames it has.
     is_shipped = environment.name in environment_names()
     if is_shipped and environment.name not in task.environments:
@@ -113,6 +156,37 @@ def load_job(
             f"Task '{task.name}' has no goals in environment '{environment.name}'. "
             f"It is for: {', '.join(task.environments)}."
         )
+    task = with_surface_goals(goals_on_person(task, environment), environment)
+    by_hand = task.goals_by_hand()
+    constraints = options.get("constraints", _NO_CONSTRAINTS)
+    around = with_obstacles(environment, constraints.blocked)
+    jobs = []
+    for hand, numbers in by_hand.items():
+        held = given
+        if hand != BARE:
+            where = f"task '{task.name}', goals[{numbers[0]}]"
+            tool = _tool_of(task, hand, where)
+            held = robot_of_hand(robot, hand.arm, tool, where=where)
+        grid, applied = _restricted_grid(task, environment, held, options)
+        jobs.append(
+            Job(
+                task=task if len(by_hand) == 1 else _of_hand(task, numbers, held),
+                spec=SceneSpec(held, around),
+                grid=grid,
+                given_robot=given,
+                observed=environment.observed_axes,
+                constraints=applied,
+                hand=hand,
+                goal_numbers=() if len(by_hand) == 1 else numbers,
+            )
+        )
+    return tuple(jobs)
+
+
+def _restricted_grid(
+    task: Task, environment: EnvironmentFile, robot: RobotFile, options: JobOptions
+) -> tuple[Grid, Constraints]:
+    """Return the grid of a job, and its constraints with the conditions that are applied to it."""
     grid = Grid.from_spec(environment.grid, where=f"environment '{environment.name}'")
     changes = task.grid_changes(environment.name)
     if changes:
@@ -120,13 +194,37 @@ def load_job(
     if robot.torso_joint is None:
         # Without a torso joint all torso levels are the same configuration.
         grid = grid.overridden({"torso": {"start": 0.0, "count": 1}}, where=f"robot '{robot.name}'")
-    kept = kept_conditions(constraints.keep, now or {}, grid)
-    conditions = (*only, *constraints.only, *kept)
-    grid = restricted(grid, conditions)
+    constraints = options.get("constraints", _NO_CONSTRAINTS)
+    kept = kept_conditions(constraints.keep, options.get("now") or {}, grid)
+    conditions = (*options.get("only", ()), *constraints.only, *kept)
     applied = dataclasses.replace(constraints, only=conditions, keep=())
-    task = with_surface_goals(goals_on_person(task, environment), environment)
-    spec = SceneSpec(robot, with_obstacles(environment, constraints.blocked))
-    return Job(task, spec, grid, environment.observed_axes, applied)
+    return restricted(grid, conditions), applied
+
+
+def _tool_of(task: Task, hand: Hand, where: str) -> str:
+    """Return the name or path of the tool file of a hand, "" for none.
+
+    Raises:
+        UnknownNameError: If the task has no tool of that name, and none ships.
+    """
+    known = {**{name: name for name in tool_names()}, **task.tools}
+    if hand.tool and hand.tool not in known:
+        raise UnknownNameError("tool", hand.tool, known, where=where)
+    return known.get(hand.tool, "")
+
+
+def _of_hand(task: Task, numbers: Sequence[int], robot: RobotFile) -> Task:
+    """Return some goals of a task as a task, with the contacts that its robot can make."""
+    tools = {task.tools.get(goal.tool, goal.tool) for goal in task.goals if goal.tool}
+    elsewhere = {load_tool(tool).name for tool in tools} - {body.name for body in robot.bodies}
+    goals = tuple(task.goals[number] for number in numbers)
+    frames = {goal.body_frame for goal in goals}
+    return dataclasses.replace(
+        task,
+        goals=goals,
+        allowed_contacts=tuple(p for p in task.allowed_contacts if p[0] not in elsewhere),
+        keep_out=tuple(one for one in task.keep_out if one.body_frame in frames),
+    )
 
 
 def data_references(job: Job, task: object, environment: object, robot: object) -> dict[str, Any]:
@@ -139,7 +237,7 @@ def data_references(job: Job, task: object, environment: object, robot: object) 
     loaded = {
         "task": (task, job.task.name),
         "environment": (environment, job.spec.environment.name),
-        "robot": (robot, job.spec.robot.name),
+        "robot": (robot, job.given_robot.name),
     }
     return {
         **{key: data_reference(given, name) for key, (given, name) in loaded.items()},

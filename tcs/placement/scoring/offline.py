@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -27,7 +27,8 @@ from tcs.placement.constraints import (
 from tcs.placement.scoring.approaches import approach_entry, approach_lines
 from tcs.placement.scoring.arms import score_arms
 from tcs.placement.scoring.engines import ScoringEngine
-from tcs.placement.scoring.job import Job, data_references, load_job
+from tcs.placement.scoring.hands import check_arms_are_free, score_hands
+from tcs.placement.scoring.job import Job, JobOptions, data_references, load_job, load_jobs
 from tcs.placement.scoring.person import person_entry
 from tcs.placement.scoring.robot_shapes import robot_shapes
 from tcs.placement.scoring.self_contact import prevailing_self_contact
@@ -64,7 +65,7 @@ class ScoringSetup:
     """Which sets are kept."""
     measure: str
     """Name of the dexterity measure."""
-    jobs: int
+    jobs: int = 2
     """Number of threads; the result does not depend on it."""
     approach: bool = False
     """Whether a goal counts as reached only by postures that can be approached."""
@@ -83,14 +84,9 @@ class ScoringSetup:
         measure: str,
         jobs: int,
         sets: SetOptions,
-        only: Sequence[str] = (),
-        constraints: Constraints = NO_CONSTRAINTS,
-        now: Mapping[str, float] | None = None,
-        person: PersonLike | None = None,
         approach: bool = False,
-        blocks: BlockFolder | None = None,
-        engine: ScoringEngine | None = None,
         build: Callable[[Job], Scene] = Job.scene,
+        **options: Unpack[JobOptions],
     ) -> Self:
         """Load and check everything, and build the scene.
 
@@ -100,17 +96,34 @@ class ScoringSetup:
         Raises:
             UnknownNameError: If a task, environment, robot, frame or measure of that name does not
                 exist.
-            DataFileError: If a file cannot be used.
+            DataFileError: If a file cannot be used, or the goals of the task name several hands.
             GridError: If the grid is empty or enormous.
             TcsError: If an option of the sets is out of range.
         """
         dexterity(measure)
-        options = checked_options(**sets)
-        job = load_job(
-            task, environment, robot, only=only, constraints=constraints, now=now, person=person
-        )
+        of_sets = checked_options(**sets)
+        job = load_job(task, environment, robot, **options)
         references = data_references(job, task, environment, robot)
-        return cls(job, build(job), references, options, measure, jobs, approach, blocks, engine)
+        return cls(job, build(job), references, of_sets, measure, jobs, approach)
+
+    @classmethod
+    def load_hands(
+        cls,
+        task: str | Path | Task,
+        environment: str | Path | EnvironmentFile,
+        robot: str | Path | RobotFile,
+        *,
+        measure: str,
+        sets: SetOptions,
+        **options: Unpack[JobOptions],
+    ) -> tuple[Self, ...]:
+        """Load and check everything as `load`, and build the scene of each hand of the goals."""
+        dexterity(measure)
+        of_sets = checked_options(**sets)
+        return tuple(
+            cls(job, job.scene(), data_references(job, task, environment, robot), of_sets, measure)
+            for job in load_jobs(task, environment, robot, **options)
+        )
 
     def score(
         self,
@@ -308,18 +321,24 @@ def score(
     """
     begun = time.perf_counter()
     robots = {"": robot} if arms is None else arm_references(robot, arms)
-    setups = {
-        arm: ScoringSetup.load(
-            task, environment, of_arm, measure=measure, jobs=jobs, sets=sets, only=only,
-            constraints=constraints, now=now, person=person, approach=approach, blocks=blocks,
-            engine=engine,
+    with_hands = {
+        arm: tuple(
+            replace(setup, jobs=jobs, approach=approach, blocks=blocks, engine=engine)
+            for setup in ScoringSetup.load_hands(
+                task, environment, of_arm, measure=measure, sets=sets, only=only,
+                constraints=constraints, now=now, person=person,
+            )
         )
         for arm, of_arm in robots.items()
     }  # fmt: skip
-    if len(setups) > 1:
+    hands = next(iter(with_hands.values()))
+    if len(with_hands) > 1:
+        check_arms_are_free(hands)
+        setups = {arm: setup for arm, (setup,) in with_hands.items()}
         return score_arms(setups, begun=begun, on_progress=on_progress, on_compile=on_compile)
-    (setup,) = setups.values()
-    return setup.score(begun=begun, on_progress=on_progress, on_compile=on_compile)
+    if len(hands) > 1:
+        return score_hands(hands, begun=begun, on_progress=on_progress, on_compile=on_compile)
+    return hands[0].score(begun=begun, on_progress=on_progress, on_compile=on_compile)
 
 
 def _task_as_dict(task: Task) -> dict[str, Any]:
@@ -331,6 +350,7 @@ def _task_as_dict(task: Task) -> dict[str, Any]:
         "tool": task.tool,
         "environments": list(task.environments),
         "allowed_contacts": [list(pair) for pair in task.allowed_contacts],
+        **({"tools": dict(task.tools)} if task.tools else {}),
         "goals": [
             {
                 "name": goal.name,
@@ -341,6 +361,8 @@ def _task_as_dict(task: Task) -> dict[str, Any]:
                 "approach": _line_as_dict(goal.approach),
                 "retreat": _line_as_dict(goal.retreat),
                 **({} if goal.free is None else {"free": str(goal.free)}),
+                **({"arm": goal.arm} if goal.arm else {}),
+                **({"tool": goal.tool} if goal.tool else {}),
             }
             for goal in task.goals
         ],

@@ -47,6 +47,7 @@ def summary(file: ScoreFile) -> dict[str, Any]:
         "reasons": dict(reasons),
         **({"constraints": texts} if (texts := constraint_texts(file)) else {}),
         **({"person": file.metadata["person"]} if "person" in file.metadata else {}),
+        **({"hands": hands_of(file)} if file.hands else {}),
         "self_contact": file.metadata.get("self_contact"),
         "tables": [
             {
@@ -87,3 +88,8 @@ def _set_summary(file: ScoreFile, members: tuple[int, ...]) -> dict[str, Any] | 
         "manipulability": round(manipulability, 12),
         "members": [grid.configuration(h).to_json() for h in members],
     }
+
+
+def hands_of(file: ScoreFile) -> list[dict[str, Any]]:
+    """Return arm, tool and goals of each hand that the goals of a file name."""
+    return [{key: entry[key] for key in ("arm", "tool", "goals")} for entry in file.hands]

@@ -24,7 +24,7 @@ from tcs.placement.scoring.drake_check import (
     DrakeChecker,
     Finding,
 )
-from tcs.placement.scoring.rebuild import rebuild_scene
+from tcs.placement.scoring.rebuild import rebuild_scenes
 from tcs.placement.scoring.strata import (
     STRATA,
     Pairs,
@@ -36,7 +36,7 @@ from tcs.placement.scoring.strata import (
     stratum_of,
 )
 from tcs.placement.scoring.sweep import ANALYTIC, NUMERIC, ik_of
-from tcs.placement.store import ScoreFile, StateTables, files_of_arms
+from tcs.placement.store import ScoreFile, StateTables
 from tcs.placement.tables import Reason
 
 FALSE_VERDICT = "SOME ANSWERS ARE FALSE"
@@ -293,10 +293,12 @@ class _FileChecker:
     tables: tuple[StateTables, ...]
     size: int
     """Number of configurations per table."""
+    hand_of_goal: tuple[tuple[int, int], ...]
+    """The hand of each goal, and its number there; () if the file is not of several hands."""
     problems: tuple[Problem, ...]
-    """The problem of each arm."""
+    """The problem of each arm, or of each hand."""
     drakes: tuple[DrakeChecker, ...]
-    """The checker of each arm."""
+    """The checker of each."""
     jobs: int
     """Number of threads of the dense scans."""
 
@@ -308,10 +310,11 @@ class _FileChecker:
             StoreMismatchError: If the models differ from those the file was made from.
         """
         measure = file.metadata["measure"]
-        built = [rebuild_scene(of_arm) for of_arm in files_of_arms(file)]
+        built = rebuild_scenes(file)
         return cls(
             file.tables,
-            len(built) * built[0][0].grid.size,
+            file.configurations.size,
+            file.hand_of_goal,
             tuple(build_problem(lowered.arrays, lowered.grid, measure) for *_, lowered in built),
             tuple(DrakeChecker(job, scene, measure) for job, scene, _ in built),
             jobs,
@@ -319,20 +322,26 @@ class _FileChecker:
 
     @property
     def ik(self) -> str:
-        """Inverse kinematics of the arms: NUMERIC if that of one is."""
+        """Inverse kinematics of the arms: NUMERIC if that of one of them is."""
         return NUMERIC if NUMERIC in map(ik_of, self.problems) else ANALYTIC
 
-    def scored(self, h: int) -> tuple[int, int]:
-        """Return the number of the arm of a configuration, and its index in the scored grid."""
+    def scored(self, h: int, g: int) -> tuple[int, int, int]:
+        """Return the number of the problem of a pair, its index in the scored grid, and its goal.
+
+        The problem is that of the arm of configuration h, or of the hand of goal g.
+        """
+        if self.hand_of_goal:
+            hand, goal = self.hand_of_goal[g]
+            return hand, h, goal
         table, row = divmod(h, self.size)
         arm_size = self.size // len(self.problems)
         arm, of_arm = divmod(row, arm_size)
-        return arm, table * arm_size + of_arm
+        return arm, table * arm_size + of_arm, g
 
     def check(self, h: int, g: int, q: NDArray[np.float64], value: float) -> Finding:
         """Return Drake's finding for configuration h, goal g and joint angles q."""
-        arm, scored = self.scored(h)
-        return self.drakes[arm].check(scored, g, q, value)
+        part, scored, goal = self.scored(h, g)
+        return self.drakes[part].check(scored, goal, q, value)
 
     def dexterity(self, h: int, g: int) -> float:
         """Return the stored dexterity."""
@@ -367,11 +376,11 @@ class _FileChecker:
             at = pair.set, pair.member
             # The origin has the arm and the observed state of the refined member.
             origin = pair.table * self.size + int(refined.origin[at])
-            arm, scored = self.scored(origin)
+            part, scored, goal = self.scored(origin, pair.goal)
             findings.append(
-                self.drakes[arm].check_at(
-                    self.drakes[arm].values(scored, refined.values[at]),
-                    pair.goal,
+                self.drakes[part].check_at(
+                    self.drakes[part].values(scored, refined.values[at]),
+                    goal,
                     refined.arm_joints[*at, pair.goal].astype(np.float64),
                     float(refined.dexterity[*at, pair.goal]),
                 )
@@ -399,20 +408,20 @@ class _FileChecker:
         return short
 
     def _runs(self, pairs: Pairs) -> list[Pairs]:
-        """Return the pairs divided where the arm changes."""
-        by_arm = itertools.groupby(pairs, lambda pair: self.scored(pair[0])[0])
-        return [list(run) for _, run in by_arm]
+        """Return the pairs divided where the problem changes."""
+        by_problem = itertools.groupby(pairs, lambda pair: self.scored(*pair)[0])
+        return [list(run) for _, run in by_problem]
 
     def _scans(self, pairs: Pairs) -> Iterator[tuple[tuple[int, int], float, NDArray[np.float64]]]:
         """Yield each pair with the dexterity and the joints of its dense scan, in order."""
 
         def scan(part: Pairs) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-            arm, _ = self.scored(part[0][0])
-            scored = np.array([(self.scored(h)[1], g) for h, g in part])
+            of_part = self.scored(*part[0])[0]
+            scored = np.array([self.scored(h, g)[1:] for h, g in part])
             joints = np.empty((len(part), 7))
-            return dense_scans(self.problems[arm], scored, DENSE_SAMPLES, joints), joints
+            return dense_scans(self.problems[of_part], scored, DENSE_SAMPLES, joints), joints
 
-        # Pairs of one arm at a time, in their order.
+        # Pairs of one problem at a time, in their order.
         parts = [
             run[start : start + SLICE]
             for run in self._runs(pairs)

@@ -49,6 +49,8 @@ class SelectionTables:
     """Sets refined between the grid points, if any."""
     derived: dict[str, Any] = field(default_factory=dict, repr=False)
     """What was derived from the sets, by name; of a file, kept for its next selection."""
+    has_hands: bool = False
+    """Whether goals name several hands, with shapes of their own."""
 
     @classmethod
     def of(cls, file: ScoreFile, table: int | None = None) -> SelectionTables:
@@ -65,6 +67,7 @@ class SelectionTables:
             partial(_of_arms, file, number) if file.arms else None,
             chosen.refined,
             chosen.derived,
+            bool(file.hands),
         )
 
     @cached_property
@@ -87,8 +90,13 @@ class SelectionTables:
         """Where the robot's shapes are, prepared for obstacles.
 
         Raises:
-            SelectionError: If the robot's shapes are not known.
+            SelectionError: If the robot's shapes are not known, or differ from goal to goal.
         """
+        if self.has_hands:
+            raise SelectionError(
+                "Contact with an obstacle seen later is checked for one hand, but goals of the "
+                "file name several. Forbid the region instead, or score with the obstacle."
+            )
         kept = self.derived.get("postures")
         if isinstance(kept, Postures) and kept.shapes is self.shapes:
             return kept

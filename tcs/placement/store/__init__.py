@@ -17,6 +17,7 @@ from tcs.placement.store.motion_file import (
 )
 from tcs.placement.store.score_file import (
     ARMS,
+    HANDS,
     REQUIRED_METADATA,
     ScoreFile,
     StateTables,
@@ -28,6 +29,7 @@ __all__ = [
     "ARMS",
     "FORMAT",
     "FORMAT_VERSION",
+    "HANDS",
     "OF_ARM",
     "REQUIRED_METADATA",
     "MotionFile",

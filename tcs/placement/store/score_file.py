@@ -39,6 +39,10 @@ ARMS = "arms"
 """Entry of the metadata of a file of several arms: robot, description, scene digest and others of
 each arm, by its name in the order of the grid."""
 
+HANDS = "hands"
+"""Entry of the metadata of a file whose goals name several hands: of each its arm, tool, goals,
+description of the robot, scene digest and others."""
+
 MAX_TABLES = 1000
 """Greatest number of observed states in a file; the tables of one take some megabytes."""
 
@@ -159,6 +163,7 @@ class ScoreFile:
         if not isinstance(only, list) or not all(isinstance(text, str) for text in only):
             raise StoreError("metadata 'only' must be a list of conditions.")
         self._check_arms()
+        self._check_hands()
         self._check_tables()
         records = self.metadata.get("robustness")
         if records is not None and (
@@ -181,6 +186,30 @@ class ScoreFile:
         ):
             raise StoreError(
                 f"metadata '{ARMS}' must describe the arms of the grid, each with "
+                f"{', '.join(keys)}."
+            )
+
+    def _check_hands(self) -> None:
+        """Check that the metadata describes each hand, and divides the goals among them."""
+        entries = self.metadata.get(HANDS, [])
+        keys = {"goals": list, "description": dict, "scene_digest": str, "arm": str, "tool": str}
+        is_well_formed = isinstance(entries, list) and all(
+            isinstance(entry, dict)
+            and all(isinstance(entry.get(key), expected) for key, expected in keys.items())
+            and all(type(goal) is int for goal in entry["goals"])
+            for entry in entries
+        )
+        if not is_well_formed or (
+            entries
+            and (
+                self.arms
+                or not self.tables
+                or sorted(goal for entry in entries for goal in entry["goals"])
+                != list(range(self.tables[0].sets.weights.size))
+            )
+        ):
+            raise StoreError(
+                f"metadata '{HANDS}' must divide the goals among hands, each with "
                 f"{', '.join(keys)}."
             )
 
@@ -221,6 +250,24 @@ class ScoreFile:
         """Names of the arms that configurations use, one each; () in a file of one arm."""
         return self.configurations.arms
 
+    @property
+    def hands(self) -> tuple[dict[str, Any], ...]:
+        """What is recorded of each hand that goals name; () if they name none, or the same."""
+        return tuple(self.metadata.get(HANDS, ()))
+
+    @cached_property
+    def hand_of_goal(self) -> tuple[tuple[int, int], ...]:
+        """The hand of each goal, and the number of the goal among those of the hand.
+
+        () in a file without hands.
+        """
+        places = {
+            goal: (number, place)
+            for number, entry in enumerate(self.hands)
+            for place, goal in enumerate(entry["goals"])
+        }
+        return tuple(places[goal] for goal in sorted(places))
+
     @cached_property
     def observed_axes(self) -> tuple[Axis, ...]:
         """The axes that can be observed and not set."""
@@ -242,12 +289,13 @@ class ScoreFile:
 
     @cached_property
     def robot_shapes(self) -> RobotShapes | None:
-        """The robot's collision shapes, None in files without them; of several arms, for the first.
+        """The robot's collision shapes, None in files without them; of the first of several arms.
 
         Raises:
             StoreError: If they are malformed, or have other torso levels than the grid.
         """
         entries = self.metadata[ARMS][self.arms[0]] if self.arms else self.metadata
+        entries = self.hands[0] if self.hands else entries
         stored = entries.get("robot_shapes")
         if stored is None:
             return None
@@ -317,17 +365,18 @@ def state_to_json(axes: tuple[Axis, ...], state: Mapping[str, float]) -> dict[st
     }
 
 
-def check_scene(file: ScoreFile, digest: str) -> None:
+def check_scene(file: ScoreFile, digest: str, hand: int | None = None) -> None:
     """Check that the scores of a file were computed from the installed models.
 
     Args:
         file: A loaded score file.
         digest: Digest of the lowered scene of the installed models.
+        hand: Number of the hand whose scene it is, in a file of several.
 
     Raises:
         StoreMismatchError: If the digests differ.
     """
-    stored = file.metadata["scene_digest"]
+    stored = (file.metadata if hand is None else file.hands[hand])["scene_digest"]
     if stored != digest:
         raise StoreMismatchError(
             f"Scores of '{file.metadata['task']}' were made by tcs "

@@ -338,6 +338,8 @@ def test_rates_of_the_arm_come_from_file_urdf_or_default(pr2):
     own = {"l_shoulder_pan_joint": 0.5}
     slow = pr2.model_copy(update={"velocity_limits": own, "acceleration_limits": own})
     assert [rates[0] for rates in slow.arm_rates()] == [0.5, 0.5]
+    smooth = pr2.model_copy(update={"jerk_limits": own})
+    assert (smooth.arm_jerks()[:2], pr2.arm_jerks()) == ([0.5, np.inf], [np.inf] * 7)
 
 
 def test_a_missing_velocity_limit_is_asked_for(pr2, monkeypatch):

@@ -44,6 +44,20 @@ def test_line_states_each_goal_that_is_missed():
     )
 
 
+def test_line_says_the_place_and_names_the_goals():
+    grid = small_grid(1, 1, 1, 1)
+    scores = one_configuration([Reason.REACHED, Reason.TOO_FAR], [-1, -1])
+    result = dataclasses.replace(
+        ViewedSet(grid, scores, (0,), None).result(0),
+        names=("chin", "left cheek"),
+        place="On the person's right, facing them.",
+    )
+    assert result.line(1).startswith(
+        "on the person's right, facing them; goal left cheek (1) not reached: "
+    )
+    assert result.line(0).endswith("too far: left cheek (1)")
+
+
 def test_goals_are_assigned_to_members_that_reach_them(bed):
     served = [bed.served(number) for number in range(len(bed.members))]
     together = sorted(goal for goals in served for goal in goals)

@@ -13,6 +13,8 @@ from tcs.output.words import (
     choice_in_words,
     explanation_in_words,
     member_places,
+    place_in_line,
+    place_of_state,
     relative_place,
     summary_in_words,
 )
@@ -37,8 +39,9 @@ def test_each_stop_has_its_place():
     for x, y in itertools.product((-3.0, 0.0, 3.0), repeat=2):
         here = tcs.InitialConfiguration(base_x=x, base_y=y, base_yaw=0.0, torso=0.0)
         choice = tcs.select(FILE, here, weights=tcs.UtilityWeights(travel=0.01))
-        found = choice_in_words(FILE, choice)
+        found = choice_in_words(FILE, choice, here)
         assert found["places"] == [place(member) for member in found["members"]]
+        assert found["here_place"] == relative_place(x, y, 0.0, BODY).text
         assert len(set(found["places"])) == 2
         turned.add(choice.order == tuple(sorted(choice.order)))
     assert turned == {True, False}
@@ -56,15 +59,36 @@ def test_places_are_of_the_state_and_the_table():
             assert member_places(file, 0, [index]) == [relative_place(*pose, frames).text]
 
 
+def test_a_base_off_the_grid_is_beside_the_person_of_the_nearest_state():
+    turned = {name: (-x, -y, z) for name, (x, y, z) in BODY.items()}
+    file = score_file(body_frames={name: [*at, *turned[name]] for name, at in BODY.items()})
+    [axis] = file.configurations.environment_axes
+    first, last = axis.value(0), axis.value(-1)
+    for value, frames in (
+        (first - 1.0, BODY), (0.6 * first + 0.4 * last, BODY),
+        (0.4 * first + 0.6 * last, turned), (last, turned),
+    ):  # fmt: skip
+        here = tcs.InitialConfiguration(
+            base_x=7.1,
+            base_y=-3.3,
+            base_yaw=1.0,
+            torso=0.0,
+            environment=((axis.name, value),),
+            environment_units=(axis.held_unit,),
+        )
+        assert place_of_state(file, 0, here) == relative_place(7.1, -3.3, 1.0, frames).text
+
+
 def test_alternatives_have_places_before_their_coordinates(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "200")
     here = tcs.InitialConfiguration(base_x=0.0, base_y=0.0, base_yaw=0.0, torso=0.0)
-    found = choice_in_words(FILE, tcs.select(FILE, here, top=tcs.Top(count=3, min_apart=0.1)))
+    found = choice_in_words(FILE, tcs.select(FILE, here, top=tcs.Top(count=3, min_apart=0.1)), here)
     assert len(found["alternatives"]) == 2
     for one in found["alternatives"]:
         assert one["places"] == [place(member) for member in one["members"]]
     report_choice(found)
     printed = capsys.readouterr().out
+    assert printed.startswith(f"Now: {place_in_line(found['here_place'])}.\nStop 1: ")
     [heading] = [line for line in printed.splitlines() if "net utility" in line]
     [row] = [line for line in printed.splitlines() if line.split()[:1] == ["3"]]
     moves = ", ".join(found["alternatives"][1]["moves"]) or "-"
@@ -96,4 +120,6 @@ def test_explanations_name_goals_and_places():
 def test_without_a_person_there_is_no_place():
     here = tcs.InitialConfiguration(base_x=0.0, base_y=0.0, base_yaw=0.0, torso=0.0)
     file = score_file()
-    assert set(choice_in_words(file, tcs.select(file, here))["places"]) == {""}
+    found = choice_in_words(file, tcs.select(file, here), here)
+    assert set(found["places"]) == {""}
+    assert found["here_place"] == ""

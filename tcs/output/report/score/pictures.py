@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -30,6 +30,12 @@ from tcs.output.report.score.scene_solids import (
     goal_solids,
     robot_solids,
 )
+from tcs.output.report.score.scored_scenes import (
+    ScoredScene,
+    scene_of_base,
+    scored_hands,
+    scored_scene,
+)
 from tcs.output.report.score.shown_set import ShownSet
 from tcs.output.words import (
     arm_text,
@@ -39,40 +45,11 @@ from tcs.output.words import (
     goals_text,
     place_in_line,
 )
-from tcs.placement.scoring import Job, rebuild_scene
-from tcs.placement.store import ScoreFile, file_of_arm
+from tcs.placement.scoring import Job
+from tcs.placement.store import ScoreFile
 
 _AROUND_A_GOAL = primitive_corners(BOX, (0.3, 0.3, 0.3))
 """Corners of the region shown around the tool [m]: the gripper and the nearby part of the body."""
-
-
-class ScoredScene(NamedTuple):
-    """The job of a score file, and its scene in the observed state of a set."""
-
-    job: Job
-    scene: Scene
-
-
-def scored_scene(
-    file: ScoreFile, shown: ShownSet, *, arm: str | None = None, meshes: bool = False
-) -> ScoredScene:
-    """Return the job and the scene of a score file.
-
-    Args:
-        file: A score file.
-        shown: The set whose observed state the scene is in.
-        arm: The arm of the robot, in a file of several.
-        meshes: Whether the robot's meshes are loaded, for the viewer.
-
-    Raises:
-        StoreMismatchError: If the models are not those the file was made from.
-        SelectionError: If the file is of several arms, and none is given.
-    """
-    of_arm = file if arm is None else file_of_arm(file, arm)
-    job, scene, _ = rebuild_scene(of_arm, meshes=meshes)
-    for name, value in file.observed_states[shown.table].items():
-        scene.set_joint(name, value)
-    return ScoredScene(job, scene)
 
 
 def map_figure(file: ScoreFile, shown: ShownSet, scored: ScoredScene | None = None) -> Figure:
@@ -86,8 +63,7 @@ def map_figure(file: ScoreFile, shown: ShownSet, scored: ScoredScene | None = No
     Raises:
         StoreMismatchError: If the models are not those the file was made from.
     """
-    # The base is the same with either arm.
-    job, scene = scored or scored_scene(file, shown, arm=next(iter(file.arms), None))
+    job, scene = scored or scene_of_base(file, shown)
     base = base_outline(scene)
     if shown.members:
         _set_environment(scene, shown.members[0])
@@ -141,14 +117,17 @@ def scene_figure(file: ScoreFile, shown: ShownSet) -> Figure:
             "nothing to draw: no initial configuration reaches a goal. `tcs map` shows where the "
             "base can be placed."
         )
-    scored = {
-        arm: scored_scene(file, shown, arm=arm)
-        for arm in dict.fromkeys(member.arm for member in shown.members)
-    }
-    panels = [
-        _member_panel(file, scored[member.arm], shown, i) for i, member in enumerate(shown.members)
-    ]
-    title = title_of(next(iter(scored.values())).job, file)
+    if file.hands:
+        hands = scored_hands(file, shown)
+        of_members = [hands] * len(shown.members)
+    else:
+        of_arms = {
+            arm: (scored_scene(file, shown, arm=arm),)
+            for arm in dict.fromkeys(member.arm for member in shown.members)
+        }
+        of_members = [of_arms[member.arm] for member in shown.members]
+    panels = [_member_panel(file, scenes, shown, i) for i, scenes in enumerate(of_members)]
+    title = title_of(of_members[0][0].job, file)
     return draw_scene(panels, title=f"{title}\n{shown.subtitle}")
 
 
@@ -167,12 +146,14 @@ def member_figure(
         StoreMismatchError: If the models are not those the file was made from.
     """
     scored = scored or scored_scene(file, shown)
-    panels = [_member_panel(file, scored, shown, number, is_close=it) for it in (False, True)]
+    panels = [_member_panel(file, (scored,), shown, number, is_close=it) for it in (False, True)]
     return draw_scene(panels, title="")
 
 
 def title_of(job: Job, file: ScoreFile) -> str:
     """Return the titles of task, environment and robot, with the arms of a file of several."""
+    if file.hands:
+        return job_title(job, str(file.robot["name"]))
     if file.arms:
         return job_title(job, f"{file.robot['name']}, {' or '.join(file.arms)} arm")
     return job_title(job)
@@ -190,14 +171,23 @@ def _set_environment(scene: Scene, member: InitialConfiguration) -> None:
 
 
 def _member_panel(
-    file: ScoreFile, scored: ScoredScene, shown: ShownSet, number: int, *, is_close: bool = False
+    file: ScoreFile,
+    hands: Sequence[ScoredScene],
+    shown: ShownSet,
+    number: int,
+    *,
+    is_close: bool = False,
 ) -> ScenePanel:
-    """Return the panel of one member: robot and person, or a close view of the tool at its goal."""
-    job, scene = scored
+    """Return the panel of one member: robot and person, or a close view of the tool at its goal.
+
+    The robot has the hand that the goal names, of a file of several.
+    """
     member, h = shown.members[number], shown.rows[number]
     scores, names = shown.scores, shown.goal_names
     served = assigned_goals(assign_goals(scores, shown.rows), number)
     current = max(served, key=lambda g: float(scores.dexterity[h, g]), default=None)
+    named = file.hand_of_goal[current][0] if file.hands and current is not None else 0
+    job, scene = hands[named]
     _set_environment(scene, member)
     scene.place_base(member.base_x, member.base_y, member.base_yaw)
     scene.set_torso(member.torso)

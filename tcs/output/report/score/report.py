@@ -13,7 +13,8 @@ from typing import Any
 from tcs.model.grid import InitialConfiguration
 from tcs.motion import plan
 from tcs.output.draw import as_png
-from tcs.output.report.score.pictures import ScoredScene, map_figure, member_figure, scored_scene
+from tcs.output.report.score.pictures import map_figure, member_figure
+from tcs.output.report.score.scored_scenes import ScoredScene, scored_scene
 from tcs.output.report.score.shown_set import ShownSet
 from tcs.output.report.score.states import has_states, states_figure
 from tcs.output.report.score.tours import Tours

@@ -10,7 +10,14 @@ from typing import NamedTuple
 import numpy as np
 
 from tcs.model.grid import Grid, InitialConfiguration
-from tcs.output.words import base_pose_text, goal_names, member_places, scores_text
+from tcs.output.words import (
+    base_pose_text,
+    goal_names,
+    member_places,
+    place_in_line,
+    place_of_state,
+    scores_text,
+)
 from tcs.placement.refinement import refined_table, score_members
 from tcs.placement.selection import SelectionTables, UtilityWeights, nearest_table, select
 from tcs.placement.store import ScoreFile
@@ -76,8 +83,10 @@ class ShownSet:
             choice = select(file, here, max_members=max_members, observed=observed, refined=refined)
             members = tuple(choice.members[i] for i in choice.order)
             indices = tuple(choice.indices[i] for i in choice.order)
+            place = place_of_state(file, table, here)
+            now = f"{place_in_line(place)}, at " if place else "at "
             what = (
-                f"selected for a robot at {base_pose_text(here.to_json())}, "
+                f"selected for a robot {now}{base_pose_text(here.to_json())}, "
                 f"travel cost {choice.cost:.2f}"
             )
             if choice.refined is not None:

@@ -12,12 +12,11 @@ from tcs.model.grid import Axis, Grid
 from tcs.output.draw import PlaceMap, StatePanel, draw_states
 from tcs.output.draw.states import Score
 from tcs.output.report.score.pictures import (
-    ScoredScene,
     base_footprints,
-    scored_scene,
     title_of,
 )
 from tcs.output.report.score.scene_solids import base_outline, environment_solids
+from tcs.output.report.score.scored_scenes import ScoredScene, scene_of_base
 from tcs.output.report.score.shown_set import ShownSet
 from tcs.output.words import axis_name, quantity
 from tcs.placement.store import ScoreFile
@@ -65,7 +64,7 @@ def states_figure(
             f"the environment has {states} states, but at most {MOST_PANELS} can be drawn on one "
             "page. Draw the map without --states."
         )
-    job, scene = scored or scored_scene(file, shown, arm=next(iter(file.arms), None))
+    job, scene = scored or scene_of_base(file, shown)
     base = base_outline(scene)
     scores = file.tables[shown.table].scores
     stands = base_footprints(shown, base)

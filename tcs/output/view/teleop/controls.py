@@ -1,8 +1,8 @@
 """Operator input: keys, sliders and gamepad become commands; no browser is needed.
 
-Meshcat counts key presses and does not report releases. A press therefore moves the arm for a
-moment only, and a held key continues by the keyboard's repeats: an arm whose operator is gone stops
-by itself.
+The operator's page reports which keys are held (`tcs.output.view.teleop.page_link`). Meshcat counts
+presses of its own buttons and does not report releases: such a press moves the arm for a moment
+only, so that an arm whose operator is gone stops by itself.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from tcs.teleop.control.settings import NULL_SPACE_MODES
 
 FloatArray = NDArray[np.float64]
 TAP = 0.15
-"""How long a press moves the arm [s]: keyboards repeat a held key every 0.03 to 0.1 s."""
+"""How long a press of a button of Meshcat moves the arm [s]."""
 MOST_LINEAR, MOST_ANGULAR = 0.25, 1.0
 """Greatest commanded velocities [m/s, rad/s]."""
 DEAD_LINEAR, DEAD_ANGULAR = 0.02, 0.05
@@ -55,6 +55,15 @@ OTHERS: Mapping[str, str] = {
     STOP: "Space",
     BACK: "KeyX",
 }
+
+
+def key_name(key: str) -> str:
+    """Return the label of a key, given by its code in the browser.
+
+    >>> key_name("KeyW"), key_name("Digit1"), key_name("Space")
+    ('W', '1', 'space')
+    """
+    return key.removeprefix("Key").removeprefix("Digit").replace("Space", "space")
 
 
 def group_button(number: int) -> str:
@@ -98,6 +107,8 @@ class Reading:
     """Whether a browser is connected to the page."""
     pose: PoseState | None = None
     """State of an XR controller; None if there is none."""
+    held: frozenset[str] = frozenset()
+    """Buttons whose keys are held down on the operator's page."""
 
 
 class Source(Protocol):
@@ -151,6 +162,8 @@ class OperatorInput:
     _counts: dict[str, int] = field(default_factory=dict)
     _until: dict[str, float] = field(default_factory=dict)
     _hint: tuple[str, float] = ("", -1.0)
+    _ignored: frozenset[str] = frozenset()
+    """Held buttons that have no effect until they are released."""
 
     @property
     def mode(self) -> Mode:
@@ -171,7 +184,9 @@ class OperatorInput:
             hand = self.pose_device.update(reading.pose, now)
             if hand.next_mode:
                 pressed[NEXT_MODE] = pressed.get(NEXT_MODE, 0) + 1
-        self._apply_switches(pressed, pad, now)
+        self._ignored &= reading.held
+        mode = self.mode
+        self._apply_switches(pressed, reading.held - self._ignored, pad, now)
         back = BACK in pressed
         lost = pad.lost or hand.lost
         if not reading.watched:
@@ -182,6 +197,9 @@ class OperatorInput:
             self._gamepad.dismiss()
             if self.pose_device is not None:
                 self.pose_device.dismiss()
+        if back or lost or STOP in pressed or self.mode is not mode:
+            # What is held was pressed for what the arm did before.
+            self._ignored = reading.held
         if back or lost or STOP in pressed:
             self._until.clear()
             if any(reading.sliders[name] for name in RATE_SLIDERS):
@@ -205,6 +223,7 @@ class OperatorInput:
         """Return to the first mode and joint group, with nothing commanded."""
         self.group, self.clutch, self._mode = 0, False, 0
         self._until.clear()
+        self._ignored = self.source.read().held
         self.source.zero()
         if self.set_point is not None:
             self.set_point.drop()
@@ -220,7 +239,9 @@ class OperatorInput:
                 self._until[name] = now + TAP
         return found
 
-    def _apply_switches(self, pressed: Mapping[str, int], pad: GamepadCommand, now: float) -> None:
+    def _apply_switches(
+        self, pressed: Mapping[str, int], held: frozenset[str], pad: GamepadCommand, now: float
+    ) -> None:
         """Change mode, group and clutch."""
         in_null_space = self.mode in NULL_SPACE_MODES
         for number in range(self.groups):
@@ -238,8 +259,9 @@ class OperatorInput:
             return
         if pressed.get(CLUTCH, 0) % 2:
             self.clutch = not self.clutch
-        moves = any(name in pressed for name in MOVES)
-        turns = TURN_DOWN in pressed or TURN_UP in pressed
+        moving = held.union(pressed)
+        moves = not moving.isdisjoint(MOVES)
+        turns = not moving.isdisjoint((TURN_DOWN, TURN_UP))
         if len(self.modes) > 1:
             if self.mode is Mode.JOINT and (moves or turns):
                 self._hint = ("joints are set by their sliders: M selects the tool.", now + 2.0)
@@ -257,7 +279,7 @@ class OperatorInput:
             wanted = None if clutch else self.set_point.read(reading, self.source)
             return Command(mode=self.mode, joints=wanted, clutch=clutch)
         if self.mode in NULL_SPACE_MODES:
-            down, up = (now < self._until.get(name, -1.0) for name in (TURN_DOWN, TURN_UP))
+            down, up = (self._is_on(name, reading, now) for name in (TURN_DOWN, TURN_UP))
             sign = int(np.sign(int(up) - int(down) + pad.turn + hand.turn))
             group = self.group if self.mode is Mode.NULL_SPACE and sign else None
             return Command(group=group, sign=sign, mode=self.mode, clutch=clutch)
@@ -269,12 +291,17 @@ class OperatorInput:
         speeds = np.repeat((reading.sliders[SPEED], reading.sliders[TURN_SPEED]), 3)
         keys = np.zeros(6)
         for name, (axis, direction, _) in MOVES.items():
-            if now < self._until.get(name, -1.0):
+            if self._is_on(name, reading, now):
                 keys[axis] += direction
         wanted += speeds * (keys + np.array([*pad.linear, *pad.angular]))
         most = np.repeat((MOST_LINEAR, MOST_ANGULAR), 3)
         wanted = np.clip(wanted, -most, most)
         return Command(linear=wanted[:3], angular=wanted[3:], mode=self.mode, clutch=clutch)
+
+    def _is_on(self, name: str, reading: Reading, now: float) -> bool:
+        """Return whether a button that moves the arm is held, or was pressed a moment ago."""
+        held = name in reading.held and name not in self._ignored
+        return held or now < self._until.get(name, -1.0)
 
     def _hint_at(self, now: float) -> str:
         text, until = self._hint

@@ -15,10 +15,13 @@ from tcs.output.view.teleop.controls import (
     OperatorCommand,
     OperatorInput,
     Reading,
+    Source,
     buttons,
+    key_name,
     sliders,
 )
 from tcs.output.view.teleop.gamepad import gamepad_state
+from tcs.output.view.teleop.page_link import PageControls, PageLink
 from tcs.output.view.teleop.panel import Panel, mode_line, readout, state_facts
 from tcs.output.view.teleop.pose_device import PoseDevice, pose_state
 from tcs.output.view.teleop.robot_display import TARGET, TOOL, RobotDisplay, Trail, pose_of
@@ -84,15 +87,6 @@ class MeshcatControls:
         return float(self._meshcat.SetSliderValue(name, value))
 
 
-def key_name(key: str) -> str:
-    """Return the label of a key, given by its code in the browser.
-
-    >>> key_name("KeyW"), key_name("Digit1"), key_name("Space")
-    ('W', '1', 'space')
-    """
-    return key.removeprefix("Key").removeprefix("Digit").replace("Space", "space")
-
-
 class LivePage:
     """An arm in Meshcat, teleoperated by the controls of its page."""
 
@@ -106,6 +100,7 @@ class LivePage:
         settings: Settings,
         modes: tuple[Mode, ...],
         latency: Latency | None = None,
+        link: PageLink | None = None,
         on_stop: Callable[[str], None],
         on_step: Callable[[Command, Step], None] | None = None,
         on_show: Callable[[FloatArray], None] | None = None,
@@ -121,6 +116,8 @@ class LivePage:
             modes: Modes that the operator can switch between, the initial one first.
             latency: Latency between the operator and the arm; None for none. A lost operator and
                 the return to the start act at once.
+            link: Keys of the operator's page, which shows the readout; None where Meshcat's own
+                page has keys and panel.
             on_stop: Called with the reason whenever the arm stops, or its reason changes.
             on_step: Called after each step with the command that the arm executes and the step,
                 once a browser has connected.
@@ -131,8 +128,11 @@ class LivePage:
         """
         self.session = Teleoperation(arm, start, settings, modes[0])
         groups, of_joints = len(settings.groups), Mode.JOINT in modes
+        controls: Source = MeshcatControls(meshcat, groups, arm if of_joints else None)
+        if link is not None:
+            controls = PageControls(controls, link)
         self.operator = OperatorInput(
-            MeshcatControls(meshcat, groups, arm if of_joints else None), modes, groups,
+            controls, modes, groups,
             pose_device=PoseDevice(settings.period),
             set_point=SetPoint(lambda: self.seen.joints) if of_joints else None,
         )  # fmt: skip
@@ -146,7 +146,7 @@ class LivePage:
         self._watched = False
         self._shown = 0
         display.set_up(meshcat, arm.kinematics(self._start).p)
-        self._panel = Panel(meshcat, arm)
+        self._panel = Panel(meshcat, arm) if link is None else link
         self._trail = Trail(meshcat)
         self._input = OperatorCommand(Command())
         self.last = self.seen = self.session.step(_REST)

@@ -10,13 +10,15 @@ from typing import Any, Literal
 import numpy as np
 
 import tcs
-from tcs.errors import TcsError
+from tcs.errors import OutputError, TcsError
 from tcs.kernel.arrays import FloatArray
 from tcs.model.robots import load_robot
 from tcs.output.view.live import open_meshcat
 from tcs.output.view.teleop.cameras import Cameras
+from tcs.output.view.teleop.controls import buttons
 from tcs.output.view.teleop.live import LivePage
-from tcs.output.view.teleop.operator_page import OperatorPage, operator_html
+from tcs.output.view.teleop.operator_page import OperatorPage, desk_of, operator_html
+from tcs.output.view.teleop.page_link import PageLink
 from tcs.output.view.teleop.robot_display import RobotDisplay, draw_course
 from tcs.output.view.teleop.start import start_posture
 from tcs.teleop import Arm, Command, Mode, Settings, Step, load_arm
@@ -29,7 +31,7 @@ from tcs.teleop.runs.recorder import Recorder
 from tcs.teleop.runs.run import Run
 
 _PAGE_PORT = 100
-"""Port of the operator's page above that of Meshcat, where no port is given."""
+"""Port of the operator's page above that of Meshcat, where none is given and that one is free."""
 LiveCondition = Literal["end-effector", "novel", "assisted", "drake", "joint"]
 CONDITION_MODES: Mapping[LiveCondition, tuple[Mode, ...]] = {
     "end-effector": (Mode.END_EFFECTOR,),
@@ -79,10 +81,10 @@ class LiveSession:
         page: The live page.
         url: Address of the page.
         cameras: The camera pictures; None without.
+        link: Keys of the page, and the readout that it shows.
     """
 
     cameras: Cameras | None
-    _server: OperatorPage | None
 
     def __init__(
         self,
@@ -122,15 +124,18 @@ class LiveSession:
             start = start_posture(self.arm, display)
         self._recorder, self._on_step = Recorder(self.arm), on_step
         self._on_stop, self._fault = on_stop, ""
-        self._open_page(start, port)
+        settings = Settings(limits=options.behaviour)
+        self.link = PageLink(buttons(len(settings.groups)))
+        self._open_page(start, port, settings)
         self.page = LivePage(
             meshcat,
             display,
             self.arm,
             start,
-            settings=Settings(limits=options.behaviour),
+            settings=settings,
             modes=CONDITION_MODES[options.condition],
             latency=options.latency,
+            link=self.link,
             on_stop=on_stop,
             on_step=self._record if record or self.course is not None else None,
             on_show=None if self.cameras is None else self._show_cameras,
@@ -139,18 +144,23 @@ class LiveSession:
             ends = np.array(self.course.line.start), np.array(self.course.line.end)
             draw_course(meshcat, *ends, GOAL_RADIUS)
 
-    def _open_page(self, start: FloatArray, port: int | None) -> None:
-        """Set the address, that of the operator's page where Meshcat's own is not enough."""
-        self.url, self.cameras, self._server = str(self._meshcat.web_url()), None, None
+    def _open_page(self, start: FloatArray, port: int | None, settings: Settings) -> None:
+        """Serve the operator's page, and start its cameras."""
         options = self._options
-        if not (options.cameras or options.xr):
-            return
-        page = operator_html(self._meshcat.port(), cameras=options.cameras, xr=options.xr)
-        page_port = self._meshcat.port() + _PAGE_PORT if port is None else port + 1
-        if options.cameras:
-            self.cameras = Cameras(self.arm, start)
+        page = operator_html(
+            self._meshcat.port(), desk_of(self.arm, settings.groups),
+            cameras=options.cameras, xr=options.xr,
+        )  # fmt: skip
+        self.cameras = Cameras(self.arm, start) if options.cameras else None
         pictures = dict if self.cameras is None else self.cameras.pictures
-        self._server = OperatorPage(page, pictures, page_port)
+        page_port = self._meshcat.port() + _PAGE_PORT if port is None else port + 1
+        try:
+            self._server = OperatorPage(page, pictures, self.link, page_port)
+        except OutputError:
+            if port is not None:
+                self.close_cameras()
+                raise
+            self._server = OperatorPage(page, pictures, self.link)
         self.url = self._server.url
 
     def _show_cameras(self, joints: FloatArray) -> None:
@@ -163,8 +173,11 @@ class LiveSession:
 
     def close(self) -> None:
         """End the camera process and the server of the operator's page."""
-        if self._server is not None:
-            self._server.close()
+        self._server.close()
+        self.close_cameras()
+
+    def close_cameras(self) -> None:
+        """End the camera process, if there is one."""
         if self.cameras is not None:
             self.cameras.close()
 

@@ -77,6 +77,10 @@ class TrialSession:
         self._session.page.run(_PAUSE)
         return run
 
+    def close(self) -> None:
+        """Close the page: its port is free again."""
+        self._session.close()
+
     def _watch(self, command: Command, step: Step) -> None:
         """Find the end of the trial; an arm that was put back to the start begins again."""
         if np.array_equal(step.joints, self._course.joints):

@@ -69,12 +69,15 @@ class Desk:
     pad: object = None
     pose: object = None
     watched: bool = True
+    held: frozenset[str] = frozenset()
 
     def press(self, name, times=1):
         self.clicks[name] += times
 
     def read(self):
-        return Reading(dict(self.sliders), dict(self.clicks), self.pad, self.watched, self.pose)
+        return Reading(
+            dict(self.sliders), dict(self.clicks), self.pad, self.watched, self.pose, self.held
+        )
 
     def set_slider(self, name, value):
         self.sliders[name] = value = round(value / JOINT_STEP) * JOINT_STEP

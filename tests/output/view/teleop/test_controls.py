@@ -63,6 +63,48 @@ def test_a_held_key_continues_by_its_repeats(operator, desk):
         assert twist(operator.read(0.1 * i))[0] > 0.0
 
 
+@pytest.mark.parametrize("name", MOVES)
+def test_a_key_moves_the_tool_until_it_is_released(operator, desk, name):
+    axis, direction, _ = MOVES[name]
+    expected = np.zeros(6)
+    expected[axis] = direction * desk.sliders[SPEED if axis < 3 else TURN_SPEED]
+    desk.held = frozenset({name})
+    for now in (0.0, 0.01, 5.0):
+        np.testing.assert_allclose(twist(operator.read(now)), expected)
+    desk.held = frozenset()
+    assert not twist(operator.read(5.01)).any()
+
+
+@pytest.mark.parametrize("switch", [STOP, BACK, NEXT_MODE])
+def test_a_key_that_outlasts_a_stop_or_a_mode_has_no_effect_until_it_is_released(
+    operator, desk, switch
+):
+    desk.held = frozenset({"ahead", TURN_UP})
+    assert operator.read(0.0).command.linear[0] > 0.0
+    desk.press(switch)
+    for now in (0.1, 0.2, 9.0):
+        command = operator.read(now).command
+        assert not np.any(command.linear)
+        assert not command.sign
+    desk.held = frozenset({"ahead"})
+    operator.read(9.1)
+    desk.held = frozenset({"ahead", TURN_UP})
+    command = operator.read(9.2).command
+    assert not np.any(command.linear)
+    assert command.sign == (1 if switch == NEXT_MODE else 0)
+
+
+def test_a_key_held_while_no_browser_is_connected_has_no_effect(operator, desk):
+    desk.watched, desk.held = False, frozenset({"ahead"})
+    assert not twist(operator.read(0.0)).any()
+    desk.watched = True
+    assert not twist(operator.read(0.1)).any()
+    desk.held = frozenset()
+    operator.read(0.2)
+    desk.held = frozenset({"ahead"})
+    assert twist(operator.read(0.3))[0] > 0.0
+
+
 def test_sliders_move_and_have_a_dead_zone(operator, desk):
     desk.sliders[X] = 0.9 * DEAD_LINEAR
     assert not twist(operator.read(0.0)).any()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import socket
 from http.client import HTTPConnection
@@ -10,7 +11,10 @@ import pytest
 
 from tcs.errors import OutputError
 from tcs.output.view.teleop import operator_page
-from tcs.output.view.teleop.operator_page import OperatorPage, operator_html
+from tcs.output.view.teleop.controls import buttons
+from tcs.output.view.teleop.operator_page import OperatorPage, desk_of, operator_html
+from tcs.output.view.teleop.page_link import PageLink
+from tcs.teleop import Settings
 
 
 @pytest.fixture
@@ -19,17 +23,22 @@ def pictures():
 
 
 @pytest.fixture
-def served(pictures):
-    found = OperatorPage("<html>driving</html>", lambda: pictures)
+def link():
+    return PageLink(buttons(4))
+
+
+@pytest.fixture
+def served(pictures, link):
+    found = OperatorPage("<html>driving</html>", lambda: pictures, link)
     yield found
     found.close()
 
 
-def got(page, path):
+def got(page, path, verb="GET", content=None, **headers):
     """Return status, type and content of a path of a page."""
     connection = HTTPConnection("127.0.0.1", int(page.url.rsplit(":", 1)[1].strip("/")), timeout=5)
     try:
-        connection.request("GET", path)
+        connection.request(verb, path, content, headers)
         reply = connection.getresponse()
         return reply.status, reply.headers["Content-Type"], reply.read()
     finally:
@@ -57,19 +66,61 @@ def test_an_occupied_port_is_refused():
         taken.listen()
         port = taken.getsockname()[1]
         with pytest.raises(OutputError, match=f"port {port}"):
-            OperatorPage("", dict, port)
+            OperatorPage("", dict, PageLink({}), port)
+
+
+def test_keys_arrive_and_the_readout_returns(served, link):
+    message = {"page": "a", "number": 1, "held": ["KeyW"], "clicks": {"KeyM": 1}}
+    status, _, content = got(served, "/link", "POST", json.dumps(message))
+    assert status == 200
+    assert json.loads(content)["mode"] == ""
+    assert link.held() == {"ahead"}
+    assert link.clicks()["next mode"] == 1
+
+
+@pytest.mark.parametrize(
+    "content", ["", "[", "[" * 4000, "null", "{}", '{"page": 1}', " " * 5000 + "{}", '"\u00e9"']
+)
+def test_other_messages_are_refused(served, link, content):
+    assert got(served, "/link", "POST", content)[0] == 400
+    assert link.held() == set()
+
+
+def test_pages_of_other_servers_cannot_drive(served, link):
+    message = json.dumps({"page": "a", "number": 1, "held": ["KeyW"], "clicks": {}})
+    host = served.url.removeprefix("http://").strip("/")
+    assert got(served, "/link", "POST", message, Origin="http://evil.example")[0] == 403
+    assert got(served, "/link", "POST", message, Host="evil.example:7100")[0] == 403
+    assert got(served, "/", Host="evil.example")[0] == 403
+    assert link.held() == set()
+    assert got(served, "/link", "POST", message, Host=host, Origin=f"http://{host}")[0] == 200
+    assert link.held() == {"ahead"}
+
+
+def test_the_page_names_every_key_and_joint(iiwa):
+    groups = Settings().groups
+    desk = desk_of(iiwa, groups)
+    assert {key["code"] for key in desk["keys"]} == set(buttons(len(groups)).values())
+    assert {key["code"] for key in desk["keys"] if not key["hold"]} == {
+        *("KeyM", "KeyC", "Space", "KeyX"), *(f"Digit{i + 1}" for i in range(len(groups))),
+    }  # fmt: skip
+    assert [joint["low"] for joint in desk["joints"]] == [-170, -120, -170, -120, -170, -120, -175]
+    assert all(joint["bounded"] for joint in desk["joints"])
 
 
 def test_the_page_is_that_of_meshcat_and_loads_nothing_from_elsewhere(meshcat):
-    page = operator_html(meshcat.port(), cameras=True, xr=True)
+    desk = {"title": "A <robot>", "keys": [{"name": "</script>"}]}
+    page = operator_html(meshcat.port(), desk, cameras=True, xr=True)
     here = f"http://localhost:{meshcat.port()}/"
     assert f'src="{here}' in page
     assert f'url = "{here}";' in page
     assert "showCameras" in page
+    assert "<title>A &lt;robot&gt;</title>" in page
+    assert page.count("</script>") == page.count("<script")
     assert all(one.startswith(here) for one in re.findall(r'(?:src|href)="([^"]*)"', page))
 
 
 def test_a_page_of_another_form_is_refused(meshcat, monkeypatch):
     monkeypatch.setattr(operator_page, "_page_of_meshcat", lambda port: "<html></html>")
     with pytest.raises(OutputError, match="cannot be extended"):
-        operator_html(meshcat.port(), cameras=True, xr=True)
+        operator_html(meshcat.port(), {}, cameras=True, xr=True)

@@ -45,7 +45,8 @@ class Script:
 def session(study, desk):
     found = TrialSession(study, "novel", port=None, on_stop=lambda _: None)
     found._session.page.operator.source = desk
-    return found
+    yield found
+    found.close()
 
 
 @pytest.fixture
