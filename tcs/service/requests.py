@@ -148,7 +148,16 @@ class ScoreRequest(Limited):
     person: Annotated[dict[str, str | Number], Field(max_length=100)] | None = None
 
 
-class ScoreHereRequest(ScoreRequest, Observed):
+class Thinned(Document):
+    """Fewer base positions, for a first answer."""
+
+    every: Annotated[int, Field(strict=True, ge=1, le=4)] = 1
+    """Score only every so many base positions along x and along y."""
+    around: tuple[Number, Number] | None = None
+    """Base position [m] whose nearest one of the grid is among those, with `every`."""
+
+
+class ScoreHereRequest(ScoreRequest, Observed, Thinned):
     """Score the scene as it is observed now, as `tcs score --observed` or `--frames`; a job."""
 
 
@@ -169,7 +178,7 @@ class Piece(Document):
     turn_deg: Number = 0.0
 
 
-class RescoreRequest(State):
+class RescoreRequest(State, Thinned):
     """Score the task of a score file again where its environment has been changed; a job."""
 
     file: FileId
@@ -178,10 +187,6 @@ class RescoreRequest(State):
     joints: Settings = Field(default_factory=dict)
     forbid: Annotated[list[ForbiddenRegion], Field(max_length=100)] = Field(default_factory=list)
     only_state: Annotated[bool, Field(strict=True)] = False
-    every: Annotated[int, Field(strict=True, ge=1, le=4)] = 1
-    """Score only every so many base positions along x and along y, for a first answer."""
-    around: tuple[Number, Number] | None = None
-    """Base position [m] whose nearest one of the grid is among those, with `every`."""
     max_members: Annotated[int, Field(strict=True, ge=1, le=3)] = 2
 
 

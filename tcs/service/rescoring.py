@@ -8,10 +8,8 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from tcs.errors import SelectionError
-from tcs.model.grid import Axis, Grid
+from tcs.model.grid import Axis, Grid, thinned
 from tcs.model.scene import Scene, SceneSpec
 from tcs.model.scene.changes import EnvironmentChanges, Shift, changed_environment
 from tcs.model.scene.pieces import PlacedPiece
@@ -64,7 +62,8 @@ class Rescorer:
                 f"{' and '.join(file.arms)}. Score the task with the robot of one arm."
             )
         begun = time.perf_counter()
-        grid = coarse(grid_of_state(file.configurations, request), request)
+        grid = grid_of_state(file.configurations, request)
+        grid = thinned(grid, request.every, request.around)
         changed = changed_environment(
             self._job_of(file).spec.environment,
             changes_of(request),
@@ -138,34 +137,3 @@ def grid_of_state(grid: Grid, request: RescoreRequest) -> Grid:
     }
     axes = tuple(states.get(axis.name, axis) for axis in grid.axes)
     return dataclasses.replace(grid, axes=axes)
-
-
-def coarse(grid: Grid, request: RescoreRequest) -> Grid:
-    """Return a grid with the base positions of a request.
-
-    Args:
-        grid: The grid with all base positions.
-        request: `every`, and a position in `around` that is to be among those that remain.
-
-    Raises:
-        SelectionError: If `around` is given without `every`.
-    """
-    if request.every == 1:
-        if request.around is not None:
-            raise SelectionError("'around' requires 'every' above 1.")
-        return grid
-    positions = dict(zip(("base_x", "base_y"), request.around or (None, None), strict=True))
-    axes = []
-    for axis in grid.axes:
-        if axis.name not in positions or axis.count == 1:
-            axes.append(axis)
-            continue
-        at = positions[axis.name]
-        nearest = 0 if at is None else int(np.argmin(np.abs(axis.values - at)))
-        first = nearest % min(request.every, axis.count)
-        count = 1 + (axis.count - 1 - first) // request.every
-        start = axis.start + first * axis.step
-        axes.append(
-            dataclasses.replace(axis, start=start, step=request.every * axis.step, count=count)
-        )
-    return dataclasses.replace(grid, axes=tuple(axes))

@@ -85,7 +85,9 @@ class SceneWork:
                 joints=observed_of(request.observed, load_environment(environment).observable_axes),
                 frames=request.frames,
                 setting=settings_of(request.at, "at"),
-            )
+            ),
+            every=request.every,
+            around=request.around,
         )
         progress(1, 1)
         return {**self._held(scored), "observation": scored.metadata["observation"]}
@@ -109,7 +111,8 @@ class SceneWork:
         """Return the live scorer of a request: the last one where only the observation differs."""
         from tcs.placement.scoring import LiveScorer
 
-        key = request.model_copy(update={"observed": {}, "frames": {}}).model_dump_json()
+        only_now = {"observed": {}, "frames": {}, "every": 1, "around": None}
+        key = request.model_copy(update=only_now).model_dump_json()
         with self._building:
             if self._scorer is None or self._scorer[0] != key:
                 self._scorer = None

@@ -33,7 +33,7 @@ class Scorers:
         self.built.append((task, environment, robot))
         return self
 
-    def score(self, _observation):
+    def score(self, _observation, *, every, around):
         raise SelectionError("scored")
 
 

@@ -10,6 +10,7 @@ from tcs.model.grid.axis import Axis
 from tcs.model.grid.condition import AxisCondition, restricted
 from tcs.model.grid.configuration import ENVIRONMENT_UNITS, InitialConfiguration
 from tcs.model.grid.grid import MAX_CONFIGURATIONS, ROBOT_AXES, Grid
+from tcs.model.grid.thinning import thinned
 
 __all__ = [
     "ENVIRONMENT_UNITS",
@@ -20,4 +21,5 @@ __all__ = [
     "Grid",
     "InitialConfiguration",
     "restricted",
+    "thinned",
 ]

@@ -12,7 +12,7 @@ from typing import Unpack
 
 from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.kernel.problem import build_problem
-from tcs.model.grid import Axis
+from tcs.model.grid import Axis, Grid, thinned
 from tcs.model.people import PersonLike
 from tcs.model.robots import RobotFile
 from tcs.model.scene import EnvironmentFile, Observation, estimate_joints
@@ -87,11 +87,19 @@ class LiveScorer:
         """The job, with the observed states that `tcs.score` would score."""
         return self._setup.job
 
-    def score(self, observation: ObservationLike | None = None) -> ScoreFile:
+    def score(
+        self,
+        observation: ObservationLike | None = None,
+        *,
+        every: int = 1,
+        around: tuple[float, float] | None = None,
+    ) -> ScoreFile:
         """Score the scene as it is observed.
 
         Args:
             observation: The observed environment; by default its nominal state.
+            every: Score only every so many base positions along x and along y, for a first answer.
+            around: x and y [m] of a base position whose nearest one of the grid is among those.
 
         Returns:
             Scores and sets of the one observed state, for every function that takes a score file.
@@ -100,18 +108,19 @@ class LiveScorer:
 
         Raises:
             UnknownNameError: If a joint or frame does not exist.
-            SelectionError: If a joint is an axis of the grid, or no state of the scene is near
-                enough to the observed frames.
+            SelectionError: If a joint is an axis of the grid, no state of the scene is near enough
+                to the observed frames, or `around` is given without `every`.
             TcsError: If a joint follows another joint, or a value is beyond its limits.
         """
         begun = time.perf_counter()
         if not isinstance(observation, Observation):
             observation = Observation(joints=dict(observation or {}))
+        grid = thinned(self.job.grid, every, around)
         with self._scene_in_use:
-            return self._score(observation, begun)
+            return self._score(observation, grid, begun)
 
-    def _score(self, observation: Observation, begun: float) -> ScoreFile:
-        """Score the scene as it is observed, as its only user."""
+    def _score(self, observation: Observation, grid: Grid, begun: float) -> ScoreFile:
+        """Score the base poses of a grid in the scene as it is observed, as its only user."""
         grid_axes = [axis.name for axis in self.job.grid.environment_axes]
         found = estimate_joints(self._setup.scene, observation, grid_axes)
         entry = {
@@ -120,7 +129,8 @@ class LiveScorer:
             "frame_position_error": found.position_error,
             "frame_rotation_error": found.rotation_error,
         }
-        setup = dataclasses.replace(self._setup, job=self._job_at(found.joints))
+        job = dataclasses.replace(self._job_at(found.joints), grid=grid)
+        setup = dataclasses.replace(self._setup, job=job)
         return setup.score(begun=begun, metadata={"observation": entry})
 
     def _job_at(self, joints: Mapping[str, float]) -> Job:

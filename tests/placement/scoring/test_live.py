@@ -79,6 +79,28 @@ def assert_same_scores(one, other):
     np.testing.assert_array_equal(one.sets.pair_cells, other.sets.pair_cells)
 
 
+def test_some_base_positions_have_the_scores_that_they_have_among_all(bed_scorer):
+    everything = bed_scorer.score({"person_y": 0.02})
+    some = bed_scorer.score({"person_y": 0.02}, every=2, around=(0.31, -1.0))
+    every, few = everything.configurations, some.configurations
+    assert few.axis("base_x").values == pytest.approx([0.3])
+    assert few.axis("base_y").values == pytest.approx([-1.0, -0.6])
+    assert few.axis("base_yaw") == every.axis("base_yaw")
+    reached = 0
+    for index in range(few.size):
+        place = few.configuration(index)
+        [same] = [h for h in range(every.size) if every.configuration(h) == place]
+        one, other = some.tables[0].scores, everything.tables[0].scores
+        assert np.array_equal(one.reason[index], other.reason[same])
+        assert np.array_equal(one.dexterity[index], other.dexterity[same])
+        reached += int(one.reached[index].sum())
+    assert reached
+    # Scoring them all afterwards scores them all.
+    assert_same_scores(bed_scorer.score({"person_y": 0.02}).tables[0], everything.tables[0])
+    with pytest.raises(SelectionError, match="'around' requires 'every'"):
+        bed_scorer.score({}, around=(0.0, 0.0))
+
+
 @pytest.mark.parametrize(
     "observation", [None, {}, {"person_x": 0.0, "head_tilt": 0.0, "wheelchair_yaw": 0.0}]
 )
