@@ -196,7 +196,7 @@ def arm_contact(problem: Problem, work: Workspace, body_A: FloatArray, q: FloatA
     boxes, body_boxes = len(problem.link_body), len(problem.body_body)
     link_poses(problem.chain_R, problem.chain_p, q, work.link_R, work.link_p)
     if len(problem.coupled):
-        _place_coupled_links(problem, work, q)
+        place_coupled_links(problem, work, q)
     partner, i, j = last[0], last[1], last[2]
     if partner >= 0 and pair_touches(problem, work, body_A, partner, i, j):
         return pair_code(problem, partner, i, j)
@@ -235,7 +235,7 @@ def arm_contact(problem: Problem, work: Workspace, body_A: FloatArray, q: FloatA
 
 
 @inner
-def _place_coupled_links(problem: Problem, work: Workspace, q: FloatArray) -> None:
+def place_coupled_links(problem: Problem, work: Workspace, q: FloatArray) -> None:
     """Fill the poses of the links between coupled joints, behind the link of their joint."""
     for n in range(len(problem.coupled)):
         i = int(problem.coupled[n, 0])
@@ -352,7 +352,7 @@ def _body_touches(problem: Problem, work: Workspace, body_A: FloatArray, g: int,
     if not closer(arm, box, body_A, other, gaps[box, other]):
         return False
     _place_shapes(problem, work, g)
-    return _groups_touch(arm, first, g, body_A, others, h, gaps, work.touching)
+    return groups_touch(arm, first, g, body_A, others, h, gaps, work.touching)
 
 
 @inner
@@ -364,11 +364,11 @@ def _arm_touches(problem: Problem, work: Workspace, g: int, h: int) -> bool:
         return False
     _place_shapes(problem, work, g)
     _place_shapes(problem, work, h)
-    return _groups_touch(arm, first, g, arm, first, h, gaps, work.touching)
+    return groups_touch(arm, first, g, arm, first, h, gaps, work.touching)
 
 
 @inner
-def _groups_touch(
+def groups_touch(
     a: FloatArray,
     first_a: IntArray,
     g: int,

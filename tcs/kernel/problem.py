@@ -208,6 +208,28 @@ def with_environment(problem: Problem, scene: SceneArrays) -> Problem:
     )
 
 
+def gaps_between(
+    first: SceneArrays, second: SceneArrays, groups: IntArray, other_groups: IntArray
+) -> FloatArray:
+    """Return the distances that the shapes of two arms of one robot must keep [m].
+
+    Every pair is checked: what one robot file exempts holds for a parked second arm only.
+
+    Args:
+        first: The scene of one arm.
+        second: The scene of the other.
+        groups: `link_first` of the problem of the first.
+        other_groups: `link_first` of the problem of the second.
+
+    Returns:
+        Rows and columns in the order of the problems, with those of the groups at the end.
+    """
+    pad, other = (scene.arm.pad[arm_order(scene)] for scene in (first, second))
+    checked = np.ones((len(pad), len(other)), np.bool_)
+    margin = max(first.self_margin, second.self_margin)
+    return _with_groups(_gaps(checked, pad, other, margin), groups, other_groups)
+
+
 def with_slides(chain: Chain) -> FloatArray:
     """Return the translations of a chain, with a column for its prismatic joints if it has any."""
     if not np.any(chain.slides):

@@ -28,6 +28,7 @@ PRINTED = {
     "12_turn_the_head": r"0 deg: 75% .*60 deg: 100% .*head_turn_deg",
     "13_arm_on_the_wheelchair": r"^100% of the goals with the arm 0\.\d\d m ahead .* by \d+ deg$",
     "14_wash_the_trunk": r"^2\d goals, .*one base pose: 14%\nreached from two: 24%",
+    "15_hold_and_wipe": r"^by both arms from one base pose: 100%\n.*20 re-checked, 0 false",
 }
 WRITTEN = {
     "01_score_and_select": ["feeding.tcs"],

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from tcs.model.robots.arms import BOTH, arm_references
 from tcs.model.robots.extras import robot_urdf
-from tcs.model.robots.hands import robot_of_hand
+from tcs.model.robots.hands import beside, links_of_arm, robot_of_hand
 from tcs.model.robots.held_tool import holding, load_robot, load_tool, tool_names
 from tcs.model.robots.loading import robot_names
 from tcs.model.robots.primitives import Primitive, read_primitives, union_volume, write_primitives
@@ -26,9 +26,11 @@ __all__ = [
     "Urdf",
     "arm_references",
     "as_obj",
+    "beside",
     "holding",
     "joint_limits",
     "kinematic_urdf",
+    "links_of_arm",
     "load_robot",
     "load_tool",
     "read_primitives",

@@ -1,4 +1,4 @@
-"""The robot that scores the goals of one hand: one of its arms, with a tool."""
+"""The robot that scores the goals of one hand: an arm with a tool, alone or beside the other."""
 
 from __future__ import annotations
 
@@ -56,3 +56,67 @@ def _of_arm(robot: Reference, arm: str, where: str) -> Reference:
     if arm not in file.arms:
         raise UnknownNameError("arm", arm, file.arms, where=f"{where}, robot '{file.name}'")
     return arm_references(robot, arm)[arm]
+
+
+def beside(robot: RobotFile, other: RobotFile) -> RobotFile:
+    """Return a robot whose other arm works at the same time, with its tool and its open gripper.
+
+    Contact between the two arms is always checked: what a file exempts holds for a parked arm.
+
+    Args:
+        robot: The robot with the arm that is scored.
+        other: The same robot with the other arm scored.
+    """
+    own = {extra.name for extra in (*robot.bodies, *robot.frames)}
+    bodies = tuple(
+        body.model_copy(update={"name": f"{body.name}_beside"}) if body.name in own else body
+        for body in other.bodies
+        if body not in robot.bodies
+    )
+    opening = {} if other.gripper is None else other.grippers[other.gripper]
+    name = robot.posture or "beside"
+    held = robot.model_copy(
+        update={
+            "name": f"{robot.name} beside {other.name}",
+            "bodies": (*robot.bodies, *bodies),
+            "frames": (*robot.frames, *(f for f in other.frames if f.name not in own)),
+            "posture": name,
+            "postures": {**robot.postures, name: {**robot.postures.get(name, {}), **opening}},
+            "arms": {},
+        }
+    )
+    left, right = (links_of_arm(held, one.arm_joints[0]) for one in (robot, other))
+    groups = tuple(
+        group.model_copy(
+            update={
+                "pairs": tuple(
+                    (a, b)
+                    for a, b in group.pairs
+                    if not ((a in left and b in right) or (a in right and b in left))
+                )
+            }
+        )
+        for group in held.disabled_groups
+    )
+    return held.model_copy(update={"disabled_groups": groups})
+
+
+def links_of_arm(robot: RobotFile, first: str) -> frozenset[str]:
+    """Return the links that a joint moves, with extra frames and bodies.
+
+    Args:
+        robot: The robot.
+        first: Name of the joint, the first one of an arm.
+    """
+    joints = robot.model().joints
+    below: dict[str, list[str]] = {}
+    for joint in joints.values():
+        below.setdefault(joint.parent, []).append(joint.child)
+    for extra in (*robot.frames, *robot.bodies):
+        below.setdefault(extra.parent, []).append(extra.name)
+    found, todo = set(), [joints[first].child]
+    while todo:
+        link = todo.pop()
+        found.add(link)
+        todo += below.get(link, [])
+    return frozenset(found)

@@ -18,7 +18,7 @@ from tcs.model.scene.environment.environment_file import (
 )
 from tcs.model.scene.environment.error_distribution import ErrorDistribution
 from tcs.model.scene.environment.shapes import environment_shapes
-from tcs.model.scene.lowered_scene import LoweredScene
+from tcs.model.scene.lowered_scene import LoweredScene, without_bodies
 from tcs.model.scene.lowering import (
     arm_chain,
     environment_at,
@@ -63,4 +63,5 @@ __all__ = [
     "torso_at",
     "with_person",
     "with_surface_goals",
+    "without_bodies",
 ]

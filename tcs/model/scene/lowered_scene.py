@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
 
-from tcs.kernel.arrays import Chain, GridArrays, SceneArrays
+from tcs.kernel.arrays import Chain, GridArrays, SceneArrays, Shapes
 
 T = TypeVar("T", SceneArrays, GridArrays)
 
@@ -54,6 +54,36 @@ class LoweredScene:
             sha.update(array.tobytes())
         sha.update(repr((self.robot_bodies, self.environment_bodies, self.goals)).encode())
         return sha.hexdigest()
+
+
+def without_bodies(lowered: LoweredScene, names: Collection[str]) -> LoweredScene:
+    """Return a scene in which some bodies of the robot, not of the scored arm, are not there.
+
+    Args:
+        lowered: The scene.
+        names: Names of the bodies.
+    """
+    arrays = lowered.arrays
+    gone = [number for number, name in enumerate(lowered.robot_bodies) if name in names]
+    kept = ~np.isin(arrays.body.body, gone)
+    body = arrays.body
+    fewer = Shapes(
+        type=body.type[kept],
+        size=body.size[kept],
+        pad=body.pad[kept],
+        body=body.body[kept],
+        frame=body.frame[kept],
+        R=body.R[:, kept],
+        p=body.p[:, kept],
+    )
+    return replace(
+        lowered,
+        arrays=arrays._replace(
+            body=fewer,
+            arm_vs_body=arrays.arm_vs_body[:, kept],
+            body_vs_environment=arrays.body_vs_environment[kept],
+        ),
+    )
 
 
 def _flat(item: object) -> Iterator[object]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -137,6 +137,18 @@ class Scene:
         for i, position, _ in self._followers:
             q[position] = values[i]
         self.built.plant.SetPositions(self._state, q)
+
+    def set_robot_joints(self, names: Sequence[str], positions: ArrayLike) -> None:
+        """Set joints of the robot other than those of the scored arm [rad or m].
+
+        Args:
+            names: Names of the joints.
+            positions: Their positions; seven numbers for six joints as for `set_arm`.
+        """
+        values = np.asarray(positions, dtype=float)[-len(names) :]
+        for name, value in zip(names, values, strict=True):
+            joint = self.built.plant.GetJointByName(name)
+            self._set(joint.position_start(), float(value))
 
     def set_joint(self, name: str, value: float) -> None:
         """Set a joint of the environment [m or rad], and the joints that follow it.

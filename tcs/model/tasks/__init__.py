@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from tcs.model.tasks.files import load_task, task_names
 from tcs.model.tasks.freedom import Freedom
-from tcs.model.tasks.hand import Hand
+from tcs.model.tasks.hand import Hand, partners
 from tcs.model.tasks.surface import Surface
 from tcs.model.tasks.task import TOOL_SPEED, Goal, KeepOut, Task
 from tcs.model.tasks.tool_line import ToolLine
@@ -22,5 +22,6 @@ __all__ = [
     "Task",
     "ToolLine",
     "load_task",
+    "partners",
     "task_names",
 ]

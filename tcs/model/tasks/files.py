@@ -15,6 +15,7 @@ from tcs.errors import TaskError, UnknownNameError
 from tcs.files.documents import Document, read_document
 from tcs.files.paths import DataFiles, expanded, is_path
 from tcs.model.tasks.freedom import Freedom
+from tcs.model.tasks.hand import partners
 from tcs.model.tasks.surface import Surface
 from tcs.model.tasks.task import Goal, KeepOut, Task
 from tcs.model.tasks.tool_line import DEFAULT_APPROACH, ToolLine
@@ -70,6 +71,7 @@ class GoalEntry(_Entry):
     free: Literal["orientation", "nothing"] | FreeEntry | None = None
     arm: str = ""
     tool: str = ""
+    together_with: str = ""
     approach: LineEntry | None = None
     retreat: LineEntry | None = None
 
@@ -173,7 +175,7 @@ def _read(path: Path) -> Task:
                 f"{where}, field 'allowed_contacts[{i}]' is {pair}, but must name two bodies."
             )
     try:
-        return Task(
+        task = Task(
             name=written.name,
             title=written.title,
             goals=tuple(goals),
@@ -191,6 +193,8 @@ def _read(path: Path) -> Task:
                 for environment, axes in written.grids.items()
             },
         )
+        partners(task.goals)
+        return task
     except TaskError as error:
         raise TaskError(f"{where}, {error}") from None
     except UnknownNameError as error:
@@ -241,6 +245,7 @@ def _goal(entry: GoalEntry, task: TaskFile) -> Goal:
         free=_freedom(entry.free if entry.free is not None else task.free),
         arm=entry.arm,
         tool=entry.tool,
+        together_with=entry.together_with,
         approach=approach,
         retreat=retreat,
     )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tcs.errors import TaskError, UnknownNameError
 from tcs.files.quantities import GOALS, SIZE, WEIGHT
 from tcs.model.tasks.freedom import Freedom
-from tcs.model.tasks.hand import Hand
+from tcs.model.tasks.hand import Hand, hands
 from tcs.model.tasks.surface import Surface
 from tcs.model.tasks.tool_line import (
     DEFAULT_APPROACH,
@@ -87,6 +87,8 @@ class Goal:
     """Name of the arm that reaches it, as the robot file names its arms; "" for the scored one."""
     tool: str = ""
     """Name of the tool that it needs, one of `Task.tools` or one that ships; "" for none."""
+    together_with: str = ""
+    """Name of the goal that another arm reaches at the same time; "" for none."""
 
     def __post_init__(self) -> None:
         """Check each value, normalise the quaternion, and make the arrays read-only.
@@ -134,7 +136,15 @@ class Goal:
     def _key(self) -> tuple[object, ...]:
         position, quaternion = self.position.tolist(), self.quaternion.tolist()
         others = (self.weight, self.approach, self.retreat, self.name, self.free)
-        return (self.body_frame, *position, *quaternion, *others, self.arm, self.tool)
+        return (
+            self.body_frame,
+            *position,
+            *quaternion,
+            *others,
+            self.arm,
+            self.tool,
+            self.together_with,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -204,10 +214,14 @@ class Task:
         return np.asarray(raw / raw.sum(), dtype=np.float64)
 
     def goals_by_hand(self) -> dict[Hand, tuple[int, ...]]:
-        """Return the numbers of the goals of each hand, in the order of the first of them."""
+        """Return the numbers of the goals of each hand, in the order of the first of them.
+
+        Raises:
+            TaskError: If goals name each other in a way that is not a pair of two arms.
+            UnknownNameError: If a goal names a goal that does not exist.
+        """
         found: dict[Hand, tuple[int, ...]] = {}
-        for number, goal in enumerate(self.goals):
-            hand = Hand(goal.arm, goal.tool)
+        for number, hand in enumerate(hands(self.goals)):
             found[hand] = (*found.get(hand, ()), number)
         return found
 

@@ -56,7 +56,13 @@ def report_catalogue(known: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
         out.print(table)
 
 
-_ON_REQUEST = ("excluded", "approach_limits", "approach_blocked")
+_ON_REQUEST = (
+    "excluded",
+    "approach_limits",
+    "approach_blocked",
+    "other_goal_unreached",
+    "arms_blocked",
+)
 """Reasons of files scored under constraints or with approach, left out where there are none."""
 
 

@@ -17,6 +17,8 @@ REASON_TEXTS = {
     Reason.EXCLUDED: "excluded by a constraint when scoring",
     Reason.APPROACH_LIMITS: "no posture at the goal can be approached within the joint limits",
     Reason.APPROACH_BLOCKED: "the arm would touch something on its way straight to the goal",
+    Reason.OTHER_GOAL_UNREACHED: "the other arm does not reach the other goal of the pair",
+    Reason.ARMS_BLOCKED: "the two arms would touch each other",
 }
 """Each reason as part of a sentence."""
 REASON_NAMES = {
@@ -30,6 +32,8 @@ REASON_NAMES = {
     Reason.EXCLUDED: "excluded by a constraint",
     Reason.APPROACH_LIMITS: "approach beyond joint limits",
     Reason.APPROACH_BLOCKED: "approach blocked",
+    Reason.OTHER_GOAL_UNREACHED: "other goal unreached",
+    Reason.ARMS_BLOCKED: "arms blocked",
 }
 """Each reason as the title of a column or in a legend."""
 REASON_COLOURS = {
@@ -43,8 +47,10 @@ REASON_COLOURS = {
     Reason.EXCLUDED: "#d9d9d9",
     Reason.APPROACH_LIMITS: "#0072b2",
     Reason.APPROACH_BLOCKED: "#8c510a",
+    Reason.OTHER_GOAL_UNREACHED: "#b2abd2",
+    Reason.ARMS_BLOCKED: "#762a83",
 }
-"""The palette of Okabe and Ito, distinct under colour vision deficiency, two greys and a brown."""
+"""The palette of Okabe and Ito, distinct under colour vision deficiency, and further colours."""
 COLOUR_NAMES = {
     Reason.REACHED: "green",
     Reason.TOO_FAR: "light blue",
@@ -56,6 +62,8 @@ COLOUR_NAMES = {
     Reason.EXCLUDED: "light grey",
     Reason.APPROACH_LIMITS: "dark blue",
     Reason.APPROACH_BLOCKED: "brown",
+    Reason.OTHER_GOAL_UNREACHED: "lilac",
+    Reason.ARMS_BLOCKED: "purple",
 }
 """Names of the colours, for text without colour."""
 

@@ -21,23 +21,28 @@ CHECKS = (
     Reason.ARM_BLOCKED,
     Reason.APPROACH_LIMITS,
     Reason.APPROACH_BLOCKED,
+    Reason.OTHER_GOAL_UNREACHED,
+    Reason.ARMS_BLOCKED,
 )
-"""Reasons why a goal is not reached, in the order in which they are checked. The first is there
-only in files that were scored under constraints, the last two in files scored with approach."""
-APPROACH = (Reason.APPROACH_LIMITS, Reason.APPROACH_BLOCKED)
+"""Reasons why a goal is not reached, in the order in which they are checked."""
+ON_REQUEST = (
+    (Reason.EXCLUDED,),
+    (Reason.APPROACH_LIMITS, Reason.APPROACH_BLOCKED),
+    (Reason.OTHER_GOAL_UNREACHED, Reason.ARMS_BLOCKED),
+)
+"""Checks that are made of some files only: under constraints, with approach, of two arms."""
 
 
 def checks_of(reasons: Mapping[Reason, int]) -> tuple[Reason, ...]:
     """Return the `CHECKS` that were made.
 
-    Constraints and approaches count only if they stopped a configuration.
+    Those of `ON_REQUEST` count only if they stopped a configuration.
 
     Args:
         reasons: Number of configurations with each reason.
     """
-    first = 0 if reasons[Reason.EXCLUDED] else 1
-    last = len(CHECKS) if any(reasons[one] for one in APPROACH) else -len(APPROACH)
-    return CHECKS[first:last]
+    absent = {one for some in ON_REQUEST if not any(reasons[one] for one in some) for one in some}
+    return tuple(one for one in CHECKS if one not in absent)
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,8 +34,10 @@ class Finding:
     """Distance of the tool from its goal, or from the nearest pose that serves as well [m]."""
     rotation_error: float
     """Rotation of the tool from its goal [rad]."""
+    dexterity: float
+    """Dexterity by Drake's Jacobian."""
     dexterity_error: float
-    """Absolute difference of the stored dexterity from that of Drake's Jacobian."""
+    """Absolute difference of the stored dexterity from that."""
     limit_violations: int
     """Number of joints beyond their limits."""
     contacts: int
@@ -52,6 +54,19 @@ class Finding:
         )
 
 
+def of_both(first: Finding, second: Finding, value: float) -> Finding:
+    """Return the finding on two arms at once, whose stored dexterity is that of the lesser."""
+    exact = min(first.dexterity, second.dexterity)
+    return Finding(
+        position_error=max(first.position_error, second.position_error),
+        rotation_error=max(first.rotation_error, second.rotation_error),
+        dexterity=exact,
+        dexterity_error=abs(exact - float(value)),
+        limit_violations=first.limit_violations + second.limit_violations,
+        contacts=first.contacts + second.contacts,
+    )
+
+
 class DrakeChecker:
     """Checks solutions of one job with Drake."""
 
@@ -65,6 +80,10 @@ class DrakeChecker:
     def check(self, h: int, g: int, q: NDArray[np.float64], value: float) -> Finding:
         """Return the finding for configuration h, goal g and joint angles q."""
         return self.check_at(self.values(h), g, q, value)
+
+    def pose_other_arm(self, q: NDArray[np.float64]) -> None:
+        """Pose the arm that works at the same time, at joint angles q [rad], for what follows."""
+        self._scene.set_robot_joints(self._job.other_joints, q)
 
     def values(self, h: int, off_grid: NDArray[np.float64] | None = None) -> dict[str, float]:
         """Return the values of all axes at configuration h [m or rad].
@@ -107,6 +126,7 @@ class DrakeChecker:
         return Finding(
             position_error=position,
             rotation_error=rotation,
+            dexterity=exact,
             dexterity_error=abs(exact - float(value)),
             limit_violations=int(np.sum((q < self._lower) | (q > self._upper))),
             contacts=len(contacts),

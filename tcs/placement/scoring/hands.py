@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 from tcs.errors import RobotError, TaskError
 from tcs.files.mapped import chunks
 from tcs.model.scene import SceneSpec
-from tcs.model.tasks import Task
+from tcs.model.tasks import Task, partners
 from tcs.placement.scoring.arms import filled, shifted
 from tcs.placement.scoring.job import BARE, Job
 from tcs.placement.scoring.person import person_entry
 from tcs.placement.scoring.sweep import ANALYTIC, NUMERIC
+from tcs.placement.scoring.together import Hands, PlacedGoal, together
 from tcs.placement.store import HANDS, OF_ARM, ScoreFile
 from tcs.placement.tables import Reason, ScoreTable
 
@@ -75,10 +76,16 @@ def score_hands(
     ]
     task = whole_task(jobs)
     numbers = [job.goal_numbers for job in jobs]
-    tables = [
-        joined_goals(of_state, numbers, task.weights)
-        for of_state in zip(*(part.tables for part in parts), strict=True)
-    ]
+    states = [list(of_state) for of_state in zip(*(part.tables for part in parts), strict=True)]
+    pairs = pairs_of(task, numbers)
+    if pairs:
+        hands = Hands([setup.job.lowered(setup.scene) for setup in setups], setups[0].measure)
+        rows = jobs[0].grid.size
+        states = [
+            together(of_state, pairs, hands, first_row=state * rows, jobs=setups[0].jobs)
+            for state, of_state in enumerate(states)
+        ]
+    tables = [joined_goals(of_state, numbers, task.weights) for of_state in states]
     spec = SceneSpec(jobs[0].given_robot, jobs[0].spec.environment)
     whole = dataclasses.replace(jobs[0], task=task, spec=spec, hand=BARE, goal_numbers=())
     entries = {
@@ -86,6 +93,27 @@ def score_hands(
         **person_entry(spec.environment, task, tables),
     }
     return dataclasses.replace(setups[0], job=whole).file_of(tables, whole.grid, begun, entries)
+
+
+def pairs_of(
+    task: Task, goals: Sequence[Sequence[int]]
+) -> tuple[tuple[PlacedGoal, PlacedGoal], ...]:
+    """Return the pairs of goals that two arms reach at the same time, each goal by its hand.
+
+    Args:
+        task: The whole task.
+        goals: Numbers of the goals of each hand.
+    """
+    places = {
+        goal: PlacedGoal(hand, place)
+        for hand, numbers in enumerate(goals)
+        for place, goal in enumerate(numbers)
+    }
+    return tuple(
+        (places[i], places[j])
+        for i, j in enumerate(partners(task.goals))
+        if j is not None and i < j
+    )
 
 
 def whole_task(jobs: Sequence[Job]) -> Task:

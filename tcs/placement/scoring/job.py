@@ -12,7 +12,15 @@ from tcs.errors import TaskError, UnknownNameError
 from tcs.files.paths import data_reference
 from tcs.model.grid import Axis, Grid, restricted
 from tcs.model.people import PersonLike
-from tcs.model.robots import RobotFile, load_robot, load_tool, robot_of_hand, tool_names
+from tcs.model.robots import (
+    RobotFile,
+    beside,
+    links_of_arm,
+    load_robot,
+    load_tool,
+    robot_of_hand,
+    tool_names,
+)
 from tcs.model.scene import (
     EnvironmentFile,
     LoweredScene,
@@ -24,6 +32,7 @@ from tcs.model.scene import (
     lower,
     with_person,
     with_surface_goals,
+    without_bodies,
 )
 from tcs.model.tasks import Hand, Task, load_task
 from tcs.placement.constraints import Constraints, kept_conditions
@@ -68,6 +77,8 @@ class Job:
     """The arm and the tool that the goals name."""
     goal_numbers: tuple[int, ...] = ()
     """Numbers of the goals in a task whose goals name several hands; () for a whole task."""
+    other_joints: tuple[str, ...] = ()
+    """Joints of the arm that works at the same time, which the scores of this one leave out."""
 
     @property
     def scored_grid(self) -> Grid:
@@ -88,8 +99,11 @@ class Job:
         return Scene(self.spec, allowed_contacts=self.task.allowed_contacts, meshes=meshes)
 
     def lowered(self, scene: Scene) -> LoweredScene:
-        """Return the scene as arrays."""
-        return lower(scene, self.task, self.scored_grid)
+        """Return the scene as arrays, without an arm that works at the same time."""
+        lowered = lower(scene, self.task, self.scored_grid)
+        if not self.other_joints:
+            return lowered
+        return without_bodies(lowered, links_of_arm(self.spec.robot, self.other_joints[0]))
 
 
 def load_job(
@@ -162,11 +176,10 @@ def load_jobs(
     around = with_obstacles(environment, constraints.blocked)
     jobs = []
     for hand, numbers in by_hand.items():
-        held = given
+        held, other_joints = given, tuple[str, ...]()
         if hand != BARE:
             where = f"task '{task.name}', goals[{numbers[0]}]"
-            tool = _tool_of(task, hand, where)
-            held = robot_of_hand(robot, hand.arm, tool, where=where)
+            held, other_joints = _robot_of(task, robot, hand, where)
         grid, applied = _restricted_grid(task, environment, held, options)
         jobs.append(
             Job(
@@ -178,6 +191,7 @@ def load_jobs(
                 constraints=applied,
                 hand=hand,
                 goal_numbers=() if len(by_hand) == 1 else numbers,
+                other_joints=other_joints,
             )
         )
     return tuple(jobs)
@@ -201,16 +215,25 @@ def _restricted_grid(
     return restricted(grid, conditions), applied
 
 
-def _tool_of(task: Task, hand: Hand, where: str) -> str:
-    """Return the name or path of the tool file of a hand, "" for none.
+def _robot_of(
+    task: Task, robot: str | Path | RobotFile, hand: Hand, where: str
+) -> tuple[RobotFile, tuple[str, ...]]:
+    """Return the robot of a hand, and the joints of the arm that works at the same time.
 
     Raises:
-        UnknownNameError: If the task has no tool of that name, and none ships.
+        UnknownNameError: If the task has no tool of that name, and none ships, or the robot has no
+            such arm.
+        RobotError: If the robot names no arms.
     """
     known = {**{name: name for name in tool_names()}, **task.tools}
-    if hand.tool and hand.tool not in known:
-        raise UnknownNameError("tool", hand.tool, known, where=where)
-    return known.get(hand.tool, "")
+    robots = []
+    for arm, tool in ((hand.arm, hand.tool), *([hand.other] if hand.other else [])):
+        if tool and tool not in known:
+            raise UnknownNameError("tool", tool, known, where=where)
+        robots.append(robot_of_hand(robot, arm, known.get(tool, ""), where=where))
+    if hand.other is None:
+        return robots[0], ()
+    return beside(*robots), robots[1].arm_joints
 
 
 def _of_hand(task: Task, numbers: Sequence[int], robot: RobotFile) -> Task:

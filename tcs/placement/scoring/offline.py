@@ -363,6 +363,7 @@ def _task_as_dict(task: Task) -> dict[str, Any]:
                 **({} if goal.free is None else {"free": str(goal.free)}),
                 **({"arm": goal.arm} if goal.arm else {}),
                 **({"tool": goal.tool} if goal.tool else {}),
+                **({"together_with": goal.together_with} if goal.together_with else {}),
             }
             for goal in task.goals
         ],

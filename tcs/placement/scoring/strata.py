@@ -15,6 +15,8 @@ SAMPLED = (Reason.JOINT_LIMITS, Reason.ARM_BLOCKED)
 """Strata of a random sample: body and gripper are free of contact, the goal within reach."""
 STRATA = (*SAMPLED, Reason.TOO_FAR)
 """Strata of a whole scan: all pairs that only a search of the arm's postures can decide."""
+OF_PAIRS = (Reason.OTHER_GOAL_UNREACHED, Reason.ARMS_BLOCKED)
+"""Strata of the goals that two arms reach at the same time."""
 CONFIDENCE = 0.95
 
 Pairs = list[tuple[int, int]]

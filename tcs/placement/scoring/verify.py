@@ -4,30 +4,26 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any, NamedTuple, Self
+from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from tcs.errors import TcsError
 from tcs.files.mapped import large_zeros
 from tcs.files.memory import CODE, THREAD, check_room
-from tcs.kernel.problem import Problem, build_problem
-from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scans
 from tcs.placement.scoring.drake_check import (
     DEXTERITY_BAR,
     POSITION_BAR,
     ROTATION_BAR,
-    DrakeChecker,
     Finding,
 )
-from tcs.placement.scoring.rebuild import rebuild_scenes
+from tcs.placement.scoring.file_checker import FileChecker, RefinedPair
 from tcs.placement.scoring.strata import (
+    OF_PAIRS,
     STRATA,
-    Pairs,
     Stratum,
     count_of,
     estimated_recall,
@@ -35,14 +31,11 @@ from tcs.placement.scoring.strata import (
     scan_counts,
     stratum_of,
 )
-from tcs.placement.scoring.sweep import ANALYTIC, NUMERIC, ik_of
-from tcs.placement.store import ScoreFile, StateTables
+from tcs.placement.store import ScoreFile
 from tcs.placement.tables import Reason
 
 FALSE_VERDICT = "SOME ANSWERS ARE FALSE"
 """What a check shows that refutes an answer."""
-SLICE = 16
-"""Pairs that a thread scans at a time: up to half a second of work, so that progress is visible."""
 
 
 @dataclass(frozen=True)
@@ -182,11 +175,13 @@ def verify(
     if limit is not None and (limit < 1 or not strata):
         raise TcsError(f"verify: limit is {limit}; it must be at least 1, and needs strata=True.")
     measure = file.metadata["measure"]
-    checker = _FileChecker.of(file, jobs)
+    checker = FileChecker.of(file, jobs)
     rng = np.random.default_rng(seed)
     reason = _reasons(file)
     reached = random_pairs(rng, reason, Reason.REACHED, pairs)
     counts = dict.fromkeys(STRATA, limit) if strata else scan_counts(reason, dense)
+    if any(partner is not None for partner in checker.partner):
+        counts |= dict.fromkeys(OF_PAIRS, limit if strata else dense)
     unreached = {r: random_pairs(rng, reason, r, count) for r, count in counts.items()}
     again = random_pairs(rng, reason, Reason.REACHED, dense)
     of_refined = checker.refined_pairs()
@@ -252,7 +247,7 @@ def check_pairs(file: ScoreFile, table: int, pairs: Sequence[tuple[int, int]]) -
     Raises:
         StoreMismatchError: If the models differ from those the file was made from.
     """
-    checker = _FileChecker.of(file, jobs=1)
+    checker = FileChecker.of(file, jobs=1)
     return checker.stored([(table * checker.size + h, g) for h, g in pairs], lambda: None)
 
 
@@ -270,164 +265,5 @@ def check_refined(
     Raises:
         StoreMismatchError: If the models differ from those the file was made from.
     """
-    checker = _FileChecker.of(file, jobs=1)
+    checker = FileChecker.of(file, jobs=1)
     return checker.refined([RefinedPair(table, row, i, g) for i, g in pairs], lambda: None)
-
-
-class RefinedPair(NamedTuple):
-    """A goal that a member of a refined set reaches, by their numbers."""
-
-    table: int
-    set: int
-    member: int
-    goal: int
-
-
-@dataclass(frozen=True)
-class _FileChecker:
-    """The three types of checks on the scores of a file.
-
-    Configurations are numbered through all tables, those of the first one first.
-    """
-
-    tables: tuple[StateTables, ...]
-    size: int
-    """Number of configurations per table."""
-    hand_of_goal: tuple[tuple[int, int], ...]
-    """The hand of each goal, and its number there; () if the file is not of several hands."""
-    problems: tuple[Problem, ...]
-    """The problem of each arm, or of each hand."""
-    drakes: tuple[DrakeChecker, ...]
-    """The checker of each."""
-    jobs: int
-    """Number of threads of the dense scans."""
-
-    @classmethod
-    def of(cls, file: ScoreFile, jobs: int) -> Self:
-        """Return the checker of a file.
-
-        Raises:
-            StoreMismatchError: If the models differ from those the file was made from.
-        """
-        measure = file.metadata["measure"]
-        built = rebuild_scenes(file)
-        return cls(
-            file.tables,
-            file.configurations.size,
-            file.hand_of_goal,
-            tuple(build_problem(lowered.arrays, lowered.grid, measure) for *_, lowered in built),
-            tuple(DrakeChecker(job, scene, measure) for job, scene, _ in built),
-            jobs,
-        )
-
-    @property
-    def ik(self) -> str:
-        """Inverse kinematics of the arms: NUMERIC if that of one of them is."""
-        return NUMERIC if NUMERIC in map(ik_of, self.problems) else ANALYTIC
-
-    def scored(self, h: int, g: int) -> tuple[int, int, int]:
-        """Return the number of the problem of a pair, its index in the scored grid, and its goal.
-
-        The problem is that of the arm of configuration h, or of the hand of goal g.
-        """
-        if self.hand_of_goal:
-            hand, goal = self.hand_of_goal[g]
-            return hand, h, goal
-        table, row = divmod(h, self.size)
-        arm_size = self.size // len(self.problems)
-        arm, of_arm = divmod(row, arm_size)
-        return arm, table * arm_size + of_arm, g
-
-    def check(self, h: int, g: int, q: NDArray[np.float64], value: float) -> Finding:
-        """Return Drake's finding for configuration h, goal g and joint angles q."""
-        part, scored, goal = self.scored(h, g)
-        return self.drakes[part].check(scored, goal, q, value)
-
-    def dexterity(self, h: int, g: int) -> float:
-        """Return the stored dexterity."""
-        table, row = divmod(h, self.size)
-        return float(self.tables[table].scores.dexterity[row, g])
-
-    def stored(self, pairs: Pairs, step: Callable[[], None]) -> list[Finding]:
-        """Return Drake's findings on the stored solutions of reached pairs."""
-        findings = []
-        for h, g in pairs:
-            table, row = divmod(h, self.size)
-            q = np.asarray(self.tables[table].scores.joints_of(row, g), dtype=np.float64)
-            findings.append(self.check(h, g, q, self.dexterity(h, g)))
-            step()
-        return findings
-
-    def refined_pairs(self) -> list[RefinedPair]:
-        """Return every goal that a member of a refined set reaches."""
-        return [
-            RefinedPair(table, int(k), int(i), int(g))
-            for table, tables in enumerate(self.tables)
-            if tables.refined is not None
-            for k, i, g in np.argwhere(tables.refined.reached)
-        ]
-
-    def refined(self, pairs: Sequence[RefinedPair], step: Callable[[], None]) -> list[Finding]:
-        """Return Drake's findings on the solutions of refined sets."""
-        findings = []
-        for pair in pairs:
-            refined = self.tables[pair.table].refined
-            assert refined is not None
-            at = pair.set, pair.member
-            # The origin has the arm and the observed state of the refined member.
-            origin = pair.table * self.size + int(refined.origin[at])
-            part, scored, goal = self.scored(origin, pair.goal)
-            findings.append(
-                self.drakes[part].check_at(
-                    self.drakes[part].values(scored, refined.values[at]),
-                    goal,
-                    refined.arm_joints[*at, pair.goal].astype(np.float64),
-                    float(refined.dexterity[*at, pair.goal]),
-                )
-            )
-            step()
-        return findings
-
-    def hits(self, pairs: Pairs, step: Callable[[], None]) -> list[bool | None]:
-        """Return whether Drake confirms the solution of a dense scan at each unreached pair.
-
-        None stands for a pair at which the scan finds no solution.
-        """
-        hits: list[bool | None] = []
-        for (h, g), value, q in self._scans(pairs):
-            hits.append(self.check(h, g, q, value).is_true if value >= 0.0 else None)
-            step()
-        return hits
-
-    def shortfall(self, pairs: Pairs, step: Callable[[], None]) -> list[float]:
-        """Return how much greater the dexterity of the dense scan is at reached pairs."""
-        short = []
-        for (h, g), value, _ in self._scans(pairs):
-            short.append(max(0.0, value - self.dexterity(h, g)))
-            step()
-        return short
-
-    def _runs(self, pairs: Pairs) -> list[Pairs]:
-        """Return the pairs divided where the problem changes."""
-        by_problem = itertools.groupby(pairs, lambda pair: self.scored(*pair)[0])
-        return [list(run) for _, run in by_problem]
-
-    def _scans(self, pairs: Pairs) -> Iterator[tuple[tuple[int, int], float, NDArray[np.float64]]]:
-        """Yield each pair with the dexterity and the joints of its dense scan, in order."""
-
-        def scan(part: Pairs) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-            of_part = self.scored(*part[0])[0]
-            scored = np.array([self.scored(h, g)[1:] for h, g in part])
-            joints = np.empty((len(part), 7))
-            return dense_scans(self.problems[of_part], scored, DENSE_SAMPLES, joints), joints
-
-        # Pairs of one problem at a time, in their order.
-        parts = [
-            run[start : start + SLICE]
-            for run in self._runs(pairs)
-            for start in range(0, len(run), SLICE)
-        ]
-        pool = Parallel(n_jobs=self.jobs, prefer="threads", return_as="generator")
-        for part, (values, joints) in zip(parts, pool(map(delayed(scan), parts)), strict=True):
-            for pair, value, q in zip(part, values, joints, strict=True):
-                yield pair, float(value), q

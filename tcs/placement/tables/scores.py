@@ -41,6 +41,10 @@ class Reason(IntEnum):
     """Scored with approach: joint limits or velocity limits end the approach of every posture."""
     APPROACH_BLOCKED = 9
     """Scored with approach: no posture can be approached without contact."""
+    OTHER_GOAL_UNREACHED = 10
+    """A goal of a pair for two arms: the other arm does not reach the other goal."""
+    ARMS_BLOCKED = 11
+    """A goal of a pair for two arms: each arm reaches its goal, but they touch each other."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -222,7 +222,7 @@ def test_distribution_equals_counting():
         counts = [one.count for one in found.blocking_pairs]
         assert counts == sorted(counts, reverse=True)
         left = GRID.size
-        for check, reason in zip(found.checks, CHECKS[1:-2], strict=True):
+        for check, reason in zip(found.checks, CHECKS[1:-4], strict=True):
             assert (check.reason, check.of) == (reason, left)
             left -= check.stopped
         assert left == found.reasons[Reason.REACHED]

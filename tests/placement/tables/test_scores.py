@@ -38,6 +38,8 @@ def test_reasons_are_counted_by_name():
         "excluded": 0,
         "approach_limits": 0,
         "approach_blocked": 0,
+        "other_goal_unreached": 0,
+        "arms_blocked": 0,
     }
 
 
@@ -79,7 +81,7 @@ WRONG = {
     "dexterity below zero": ("dexterity", lambda a: a - 1.0, "dexterity"),
     "dexterity not a number": ("dexterity", lambda a: a * np.float32(np.nan), "dexterity"),
     "dexterity where not reached": ("dexterity", lambda a: a + np.float32(0.1), "not reached"),
-    "reason unknown": ("reason", lambda a: a + np.uint8(4), r"outside 0\.\.9"),
+    "reason unknown": ("reason", lambda a: a + np.uint8(6), r"outside 0\.\.11"),
     "pair unknown": ("pair", lambda a: a + np.int32(1), r"outside -1\.\.0"),
     "joints missing": ("arm_joints", lambda a: a[:2], "2 rows of arm joints for 3"),
     "six joints": ("arm_joints", lambda a: a[:, :6].copy(), "shape"),
@@ -110,4 +112,6 @@ def test_reason_numbers_are_those_of_stored_files():
         ("EXCLUDED", 7),
         ("APPROACH_LIMITS", 8),
         ("APPROACH_BLOCKED", 9),
+        ("OTHER_GOAL_UNREACHED", 10),
+        ("ARMS_BLOCKED", 11),
     ]

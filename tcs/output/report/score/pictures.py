@@ -11,8 +11,9 @@ from matplotlib.figure import Figure
 from tcs.errors import SelectionError
 from tcs.kernel.arrays import BOX
 from tcs.model.grid import Grid, InitialConfiguration
+from tcs.model.robots import links_of_arm
 from tcs.model.scene import Scene, goal_poses
-from tcs.model.tasks import Task
+from tcs.model.tasks import Task, partners
 from tcs.output.draw import (
     BaseFootprint,
     Category,
@@ -194,8 +195,18 @@ def _member_panel(
     joints = scores.joints_of(h, current) if current is not None else None
     if joints is not None:
         scene.set_arm(joints)
+    shown_goals, other_arm = [] if current is None else [current], frozenset[str]()
+    if current is not None and job.other_joints:
+        # The other arm is at the other goal of the pair.
+        partner = partners(job.task.goals)[current]
+        assert partner is not None
+        of_partner = scores.joints_of(h, partner)
+        assert of_partner is not None
+        scene.set_robot_joints(job.other_joints, of_partner)
+        shown_goals.append(partner)
+        other_arm = links_of_arm(job.spec.robot, job.other_joints[0])
     solids = [
-        *robot_solids(scene),
+        *robot_solids(scene, other_arm),
         *environment_solids(scene),
         *goal_solids(scene, job.task, current),
     ]
@@ -214,8 +225,8 @@ def _member_panel(
         where = place_in_line(shown.places[number])
         caption = f"stop {number + 1}{arm}{f': {where}' if where else ''}\n"
         caption += f"serves {goals_text(served, names) if served else 'no goal'}"
-        if current is not None:
-            caption += f"; arm at goal {goal_text(current, names[current])}"
+        if shown_goals:
+            caption += f"; arm{'s' * (len(shown_goals) - 1)} at {goals_text(shown_goals, names)}"
     azimuths = tuple(along + math.radians(angle) for angle in angles_deg)
     marks = [
         GoalMark(goal, names[goal], at, is_reached=bool(scores.reached[h, goal]))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from tcs.kernel.arrays import BOX
@@ -16,11 +18,16 @@ _ARROW = (0.15, 0.06, 0.010, 0.026)
 """Length of a goal's arrow and of its head, half width of shaft and head [m]."""
 
 
-def robot_solids(scene: Scene) -> list[Solid]:
-    """Return the collision shapes of the robot in the present state of the scene."""
+def robot_solids(scene: Scene, other_arm: Collection[str] = ()) -> list[Solid]:
+    """Return the collision shapes of the robot in the present state of the scene.
+
+    Args:
+        scene: The scene.
+        other_arm: Bodies of an arm that works beside the scored one.
+    """
     categories = {Group.ARM: Category.ARM, Group.BODY: Category.ROBOT}
     return [
-        part_solid(scene, part, categories[part.group])
+        part_solid(scene, part, categories[Group.ARM if part.name in other_arm else part.group])
         for part in scene.built.parts
         if part.group in categories
     ]

@@ -1,0 +1,233 @@
+"""Pairs of goals that two arms reach at the same time: the arms are checked against each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+
+from tcs.kernel.problem import Problem, build_problem
+from tcs.model.scene import LoweredScene
+from tcs.placement.tables import Reason, ScoreTable
+
+if TYPE_CHECKING:
+    from tcs.kernel.together.arms import TwoArms
+
+SLICE = 64
+"""Configurations that a thread checks at a time: up to some seconds if postures are searched."""
+
+FIRST_SAMPLES, FINEST_SAMPLES = 64, 3072
+"""Values of the free joint of either arm that are tried where their best postures touch: at first,
+and then at most."""
+MOST_POSTURES = 800
+"""Postures of an arm that the finer samples should not exceed: all pairs of them are tried."""
+
+
+class PlacedGoal(NamedTuple):
+    """A goal by the hand that reaches it."""
+
+    hand: int
+    """Number of the hand."""
+    goal: int
+    """Number of the goal among those of the hand."""
+
+
+@dataclass(frozen=True)
+class Hands:
+    """The scenes of hands, to check them against each other."""
+
+    lowered: Sequence[LoweredScene]
+    """The scene of each hand, without the arm that works at the same time."""
+    measure: str
+    """Name of the dexterity measure."""
+
+    @cached_property
+    def problems(self) -> tuple[Problem, ...]:
+        """The problem of each hand."""
+        return tuple(build_problem(one.arrays, one.grid, self.measure) for one in self.lowered)
+
+    def two(self, first: int, second: int) -> TwoArms:
+        """Return two of the hands, with memory of their own."""
+        # Imported here: scoring of goals by themselves does not import this part of the kernel.
+        from tcs.kernel.together.arms import TwoArms
+
+        scenes = self.lowered[first].arrays, self.lowered[second].arrays
+        return TwoArms(self.problems[first], self.problems[second], scenes)
+
+    def names(self, first: int, second: int, bodies: NDArray[np.int64]) -> tuple[str, str]:
+        """Return the names of a body of the first hand's arm and of one of the second's."""
+        a, b = (self.lowered[hand].robot_bodies for hand in (first, second))
+        return a[int(bodies[0])], b[int(bodies[1])]
+
+
+class _Columns:
+    """The scores of one hand, to be changed goal by goal."""
+
+    def __init__(self, table: ScoreTable) -> None:
+        self.reason, self.pair = table.reason.copy(), table.pair.astype(np.int32)
+        self.dexterity, self.joints = table.dexterity.copy(), table.arm_joints.copy()
+        self.names = dict.fromkeys(table.pair_names)
+        self._weights = table.weights
+        reached = table.reason == Reason.REACHED
+        # Row of the joints of each pair, -1 where it is not reached.
+        self._row = np.where(reached, np.cumsum(reached).reshape(reached.shape) - 1, -1)
+
+    def joints_at(self, rows: NDArray[np.intp], goal: int) -> NDArray[np.float64]:
+        """Return the joints at a reached goal [rad], shape (n, 7)."""
+        return np.asarray(self.joints[self._row[rows, goal]], dtype=np.float64)
+
+    def refuse(self, rows: NDArray[np.intp], goal: int, reason: Reason) -> None:
+        """Replace reached pairs by a reason."""
+        self.reason[rows, goal], self.dexterity[rows, goal] = reason, 0.0
+
+    def block(self, row: int, goal: int, names: tuple[str, str]) -> None:
+        """Name the bodies of a contact."""
+        self.names.setdefault(names)
+        self.pair[row, goal] = list(self.names).index(names)
+
+    def reach(self, row: int, goal: int, joints: NDArray[np.float64]) -> None:
+        """Replace the joints of a reached pair."""
+        self.joints[self._row[row, goal]] = joints
+
+    def table(self) -> ScoreTable:
+        """Return the scores."""
+        reached = self.reason == Reason.REACHED
+        return ScoreTable(
+            dexterity=self.dexterity,
+            reason=self.reason,
+            pair=self.pair,
+            pair_names=tuple(self.names),
+            arm_joints=self.joints[self._row[reached]],
+            weights=self._weights,
+        )
+
+
+def together(
+    tables: Sequence[ScoreTable],
+    pairs: Sequence[tuple[PlacedGoal, PlacedGoal]],
+    hands: Hands,
+    *,
+    first_row: int,
+    jobs: int,
+) -> list[ScoreTable]:
+    """Return the scores of hands with pairs of goals reached by two arms at the same time.
+
+    Both goals of a pair are reached where some pair of postures holds each tool at its goal, and
+    neither arm touches the other. Of these the one with the greatest lesser dexterity is stored,
+    with that dexterity at both goals.
+
+    Args:
+        tables: The scores of each hand by itself, in one observed state.
+        pairs: The pairs of goals.
+        hands: The scenes of the hands.
+        first_row: Index of the first row of the tables in the scored grid.
+        jobs: Number of threads; the scores do not depend on it.
+    """
+    columns = [_Columns(table) for table in tables]
+    for a, b in pairs:
+        one, other = columns[a.hand], columns[b.hand]
+        alone = [
+            column.reason[:, goal] == Reason.REACHED for column, (_, goal) in ((one, a), (other, b))
+        ]
+        one.refuse(np.flatnonzero(alone[0] & ~alone[1]), a.goal, Reason.OTHER_GOAL_UNREACHED)
+        other.refuse(np.flatnonzero(alone[1] & ~alone[0]), b.goal, Reason.OTHER_GOAL_UNREACHED)
+        rows = np.flatnonzero(alone[0] & alone[1])
+        slices = [rows[start : start + SLICE] for start in range(0, rows.size, SLICE)]
+        known = [(one.joints_at(some, a.goal), other.joints_at(some, b.goal)) for some in slices]
+        found = Parallel(n_jobs=jobs, prefer="threads")(
+            delayed(_pairs_of_postures)(hands, a, b, first_row + some, *joints)
+            for some, joints in zip(slices, known, strict=True)
+        )
+        for some, of_slice in zip(slices, found, strict=True):
+            for row, pair in zip(some.tolist(), of_slice, strict=True):
+                if pair.joints is None:
+                    for column, goal in ((one, a.goal), (other, b.goal)):
+                        column.refuse(np.array([row]), goal, Reason.ARMS_BLOCKED)
+                    names = hands.names(a.hand, b.hand, pair.bodies)
+                    one.block(row, a.goal, names)
+                    other.block(row, b.goal, names[::-1])
+                    continue
+                lesser = min(one.dexterity[row, a.goal], other.dexterity[row, b.goal])
+                lesser = lesser if pair.value is None else np.float32(pair.value)
+                for column, goal, q in ((one, a.goal, 0), (other, b.goal, 1)):
+                    column.dexterity[row, goal] = lesser
+                    column.reach(row, goal, pair.joints[q])
+    return [column.table() for column in columns]
+
+
+class _Found(NamedTuple):
+    """What two arms can do at a configuration."""
+
+    joints: tuple[NDArray[np.float64], NDArray[np.float64]] | None
+    """Joints of both arms [rad]; None if they touch each other in every pair of postures."""
+    value: float | None
+    """Lesser dexterity; None where the best posture of each arm by itself is free of the other."""
+    bodies: NDArray[np.int64]
+    """The bodies in contact where the arms take their best postures; -1 without contact."""
+
+
+def _pairs_of_postures(
+    hands: Hands,
+    a: PlacedGoal,
+    b: PlacedGoal,
+    configurations: NDArray[np.intp],
+    first: NDArray[np.float64],
+    second: NDArray[np.float64],
+) -> list[_Found]:
+    """Return the best pair of postures of each configuration that reaches both goals."""
+    two = hands.two(a.hand, b.hand)
+    torsos = (configurations % two.problems[0].torso_levels).astype(np.int64)
+    bodies = two.contacts(torsos, first, second)
+    is_posed = not any(
+        len(hands.lowered[hand].arrays.freedom) and np.any(hands.lowered[hand].arrays.freedom[goal])
+        for hand, goal in (a, b)
+    )
+    found = []
+    for n, h in enumerate(configurations.tolist()):
+        if bodies[n, 0] < 0:
+            found.append(_Found((first[n], second[n]), None, bodies[n]))
+            continue
+        if is_posed and two.grippers_meet((int(bodies[n, 0]), int(bodies[n, 1]))):
+            # The goals place the grippers, whatever the postures.
+            found.append(_Found(None, None, bodies[n]))
+            continue
+        known = first[n : n + 1], second[n : n + 1]
+        best = searched(two, h, (a.goal, b.goal), known)
+        value, joints = (None, None) if best is None else (best[0], best[1:])
+        found.append(_Found(joints, value, bodies[n]))
+    return found
+
+
+def searched(
+    two: TwoArms,
+    h: int,
+    goals: tuple[int, int],
+    known: tuple[NDArray[np.float64], NDArray[np.float64]],
+    *,
+    finest: int = FINEST_SAMPLES,
+    most: int = MOST_POSTURES,
+) -> tuple[float, NDArray[np.float64], NDArray[np.float64]] | None:
+    """Return the best pair of postures that are free of each other, None if none is found.
+
+    Where the first samples give none, finer ones follow: the fewer postures the arms have, the
+    finer.
+
+    Args:
+        two: The two arms.
+        h: Index of the configuration in the scored grid.
+        goals: The goal of each arm.
+        known: A free posture of each arm by itself [rad], shape (0 or 1, 7).
+        finest: Greatest number of values of each free joint.
+        most: Number of postures of an arm that the finer samples should not exceed.
+    """
+    best = two.best_pair(h, goals, known, FIRST_SAMPLES)
+    if best is not None:
+        return best
+    counts = [len(two.postures(k, h, goals[k], known[k], FIRST_SAMPLES)[0]) for k in range(2)]
+    samples = min(finest, FIRST_SAMPLES * most // max(*counts, 1))
+    return two.best_pair(h, goals, known, samples) if samples > FIRST_SAMPLES else None
