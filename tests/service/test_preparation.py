@@ -24,6 +24,7 @@ class Scorers:
     def __init__(self, monkeypatch, *, compiles=False):
         self.built, self.compiles, self.may_build = [], compiles, threading.Event()
         self.may_build.set()
+        self.thinned: list[tuple] = []
         monkeypatch.setattr(tcs.placement.scoring, "LiveScorer", self)
 
     def __call__(self, task, environment, robot, *, on_compile, **_options):
@@ -34,6 +35,7 @@ class Scorers:
         return self
 
     def score(self, _observation, *, every, around):
+        self.thinned.append((every, around))
         raise SelectionError("scored")
 
 
@@ -50,6 +52,8 @@ def test_the_first_job_finds_its_scene(monkeypatch):
         assert scorers.built == [("shaving", "wheelchair", "pr2")]
         assert engine.prepare() is engine.prepare()
         assert here(engine, observed={"person_x": 0.01}) == "scored"
+        assert here(engine, every=2, around=(0.5, 1.0)) == "scored"
+        assert scorers.thinned == [(1, None), (2, (0.5, 1.0))]
         assert len(scorers.built) == 1
         assert here(engine, task="feeding") == "scored"
         assert scorers.built[1:] == [("feeding", "wheelchair", "pr2")]
