@@ -29,7 +29,10 @@ def main() -> int:
     row("samples", str(options.samples))
     for path in options.files:
         file = tcs.load(path)
-        plan = tcs.plan(file, file.nominal.sets.best, seed=options.seed)
+        # The tables of a file with observed states follow one another.
+        first = file.nominal_index * file.configurations.size
+        best = [first + member for member in file.nominal.sets.best]
+        plan = tcs.plan(file, best, seed=options.seed)
         success = evaluate_plan(plan, samples=options.samples, seed=options.seed)
         cells = {
             "stops": str(len(plan.stops)),
