@@ -1,15 +1,23 @@
-"""Solve arms of six joints at random poses, and compare with every solution that EAIK finds.
+"""Solve arms of six joints at random poses, and compare with every solution of EAIK and of ssik.
 
-Usage: python benchmarks/six_joints.py [--robots ur5,jaco] [--poses 10000] [--seed 0]
+Usage: python benchmarks/six_joints.py [--robots ur5,jaco] [--ssik-arms jaco2,crx10ia]
+           [--poses 10000] [--seed 0]
 
-Poses are those of random postures, joints anywhere in a full turn. Solutions of EAIK count if they
-bring the tool to its pose; ours are all confirmed by forward kinematics.
+Arms with a closed form are compared with EAIK. Arms without one are those that come with ssik.
+
+Poses are those of random postures, joints anywhere in a full turn. Solutions of a peer count if
+they bring the tool to its pose; ours are all confirmed by forward kinematics. ssik is not among the
+packages that `make` installs: `pip install ssik`.
 """
 
 from __future__ import annotations
 
+import argparse
+import importlib.util
 import sys
 import time
+from collections.abc import Callable, Iterable
+from typing import Any
 
 import numpy as np
 from table import cell, header, parser, row, save
@@ -24,54 +32,77 @@ from tcs.model.scene import EMPTY_ENVIRONMENT, Scene, SceneSpec, arm_chain
 SAME = 1e-5
 """Greatest difference of equal joint angles [rad]; next to a singularity both are less exact."""
 ON_POSE = 1e-7
-"""Greatest error of a solution of EAIK, as of ours [entries of the rotation matrix; m]:
+"""Greatest error of a solution of a peer, as of ours [entries of the rotation matrix; m]:
 solutions in the sense of least squares exceed it."""
+
+PEERS = {"poses": "EAIK", "elimination": "ssik"}
+"""What each table compares with."""
+Solve = Callable[[Chain, list[tuple[FloatArray, FloatArray]]], tuple[list[FloatArray], float]]
+"""Solves an arm at poses: solutions, and processor time [s]."""
 
 
 def main() -> int:
-    """Compare on every robot; return 1 if a solution of EAIK is missing."""
+    """Compare on every robot; return 1 if a solution of a peer is missing."""
     command_line = parser(__doc__)
     command_line.add_argument("--robots", default="ur5,jaco")
+    command_line.add_argument("--ssik-arms", default="jaco2,crx10ia")
     command_line.add_argument("--poses", type=int, default=10_000)
     command_line.add_argument("--seed", type=int, default=0)
     options = command_line.parse_args()
-    header("eaik")
+    header("eaik", "ssik")
     row("seed", str(options.seed))
     missing = 0
-    for robot in options.robots.split(","):
-        missing += compare(robot, options.poses, options.seed)
-    save(options)
+    for robot in filter(None, options.robots.split(",")):
+        chain = robot_chain(robot)
+        missing += compare("poses", robot, chain, solved_by_eaik, options)
+    arms = options.ssik_arms
+    if arms and importlib.util.find_spec("ssik") is None:
+        row("ssik", "not installed: its arms are left out (pip install ssik)")
+        arms = ""
+    for arm in filter(None, arms.split(",")):
+        missing += compare("elimination", arm, *ssik_arm(arm), options)
+    save(options, keep=True)
     return 1 if missing else 0
 
 
-def compare(robot: str, poses: int, seed: int) -> int:
-    """Solve the poses with both; print and record the result; return what is missing."""
+def robot_chain(robot: str) -> Chain:
+    """Return the arm of a robot that ships."""
     scene = Scene(SceneSpec(load_robot(robot), EMPTY_ENVIRONMENT))
     scene.set_arm(np.zeros(6))
-    chain, _ = arm_chain(scene)
+    return arm_chain(scene)[0]
+
+
+def compare(
+    table: str, name: str, chain: Chain, solved_by_peer: Solve, options: argparse.Namespace
+) -> int:
+    """Solve the poses with both; print and record the result; return what is missing."""
+    poses, peer = options.poses, PEERS[table]
     postures = np.zeros((poses, 7))
-    postures[:, 1:] = np.random.default_rng(seed).uniform(-np.pi, np.pi, (poses, 6))
+    drawn = np.random.default_rng(options.seed).uniform(-np.pi, np.pi, (poses, 6))
+    postures[:, 1:] = drawn
     targets = [link_poses(chain, q)[-1] for q in postures]
     ours, seconds = solved(chain, targets)
-    theirs, their_seconds = solved_by_eaik(chain, targets)
-    # Not the posture that made the pose: EAIK need not find it either.
+    theirs, their_seconds = solved_by_peer(chain, targets)
+    # Not the posture that made the pose: a peer need not find it either.
     unknown = [
         sum(not _is_among(q, found) for q in others)
         for found, others in zip(ours, theirs, strict=True)
     ]
     lost = sum(not _is_among(q, found) for q, found in zip(postures, ours, strict=True))
+    not_theirs = sum(not _is_among(q, found) for q, found in zip(postures, theirs, strict=True))
     values = {
         "poses": f"{poses:,}",
         "postures recovered": f"{poses - lost:,}",
         "solutions": f"{sum(map(len, ours)):,}",
-        "solutions of EAIK": f"{sum(map(len, theirs)):,}",
+        f"solutions of {peer}": f"{sum(map(len, theirs)):,}",
         "of these found": f"{sum(map(len, theirs)) - sum(unknown):,}",
+        f"postures recovered by {peer}": f"{poses - not_theirs:,}",
         "per pose [us of one core]": f"{seconds / poses * 1e6:.1f}",
-        "EAIK, per pose [us of one core]": f"{their_seconds / poses * 1e6:.1f}",
+        f"{peer}, per pose [us of one core]": f"{their_seconds / poses * 1e6:.1f}",
     }
     for column, text in values.items():
-        row(f"{robot}: {column}", text)
-        cell("poses", robot, column, text)
+        row(f"{name}: {column}", text)
+        cell(table, name, column, text)
     return sum(unknown) + lost
 
 
@@ -105,14 +136,62 @@ def solved_by_eaik(
     seconds = time.process_time() - begun
     found = []
     for answer, (R, p) in zip(answers, targets, strict=True):
-        kept = []
-        for joints in np.asarray(answer.Q).reshape(-1, 6) if answer.num_solutions() else ():
-            q = np.concatenate([[0.0], joints])
-            S, s = link_poses(chain, q)[-1]
-            if max(np.abs(S - R).max(), np.abs(s - p).max()) < ON_POSE:
-                kept.append(q)
-        found.append(np.array(kept).reshape(-1, 7))
+        joints = np.asarray(answer.Q).reshape(-1, 6) if answer.num_solutions() else ()
+        found.append(_on_pose(chain, joints, R, p))
     return found, seconds
+
+
+def ssik_arm(name: str) -> tuple[Chain, Solve]:
+    """Return an arm that comes with ssik, and its solver there."""
+    from ssik import Manipulator
+
+    arm = Manipulator.from_prebuilt(name)
+    R, p = np.tile(np.eye(3), (8, 1, 1)), np.zeros((8, 3))
+    before = np.eye(4)
+    for i, joint in enumerate(arm.kinbody.joints, 1):
+        to_z = np.eye(4)
+        to_z[:3, :3] = _rotation_to(np.asarray(joint.axis))
+        X = before @ joint.T_left @ to_z
+        R[i], p[i] = X[:3, :3], X[:3, 3]
+        before = to_z.T @ joint.T_right
+    R[7], p[7] = before[:3, :3], before[:3, 3]
+    chain = Chain(R, p, np.full(7, -np.inf), np.full(7, np.inf), joints=6)
+
+    def solve(
+        chain: Chain, targets: list[tuple[FloatArray, FloatArray]]
+    ) -> tuple[list[FloatArray], float]:
+        matrices = np.tile(np.eye(4), (len(targets), 1, 1))
+        for X, (R, p) in zip(matrices, targets, strict=True):
+            X[:3, :3], X[:3, 3] = R, p
+        arm.solve(matrices[0])
+        begun = time.process_time()
+        answers = [arm.solve(X, respect_limits=False) for X in matrices]
+        seconds = time.process_time() - begun
+        found = [
+            _on_pose(chain, [solution.q for solution in answer], R, p)
+            for answer, (R, p) in zip(answers, targets, strict=True)
+        ]
+        return found, seconds
+
+    return chain, solve
+
+
+def _rotation_to(axis: FloatArray) -> FloatArray:
+    """Return a rotation whose z axis is a unit vector."""
+    x = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+    x = x / np.linalg.norm(x)
+    return np.column_stack([x, np.cross(axis, x), axis])
+
+
+def _on_pose(chain: Chain, postures: Iterable[FloatArray], R: FloatArray, p: FloatArray) -> Any:
+    """Return the postures of a peer that bring the tool to its pose, shape (n, 7)."""
+    kept = []
+    for joints in postures:
+        q = np.concatenate([[0.0], joints])
+        S, s = link_poses(chain, q)[-1]
+        if max(np.abs(S - R).max(), np.abs(s - p).max()) < ON_POSE:
+            kept.append(q)
+    return np.array(kept).reshape(-1, 7)
 
 
 def _zero_poses(chain: Chain) -> FloatArray:

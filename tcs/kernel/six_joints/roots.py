@@ -20,7 +20,7 @@ WIDEST = np.pi / 6
 """Greatest width of such an arc [rad]: there the polynomial of the nodes is exact to rounding."""
 MOST_ARCS = 64
 """Greatest number of arcs that are waiting."""
-RELIABLE = 1e-4
+RELIABLE = 1e-2
 """Fraction of the greatest value below which a polynomial is too rounded to be used."""
 FINEST = 1e-5
 """Width of a cell [rad] below which no shorter arc is sampled."""
