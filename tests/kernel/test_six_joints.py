@@ -215,13 +215,15 @@ def test_elimination_finds_all_solutions_of_a_bent_wrist():
         assert len(found) >= len(expected)
 
 
-def test_elimination_finds_the_solutions_of_a_last_axis_parallel_to_the_first():
+@pytest.mark.parametrize(
+    "p", [(0.1, 0.2, 0.1), (-0.1, -0.3, 0.1), (0.4, 0.1, 0.2), (0.1, -0.1, 0.5)]
+)
+def test_elimination_finds_the_solutions_of_a_last_axis_parallel_to_the_first(p):
     # Solutions then share the angle that elimination searches.
     chain = bent_wrist("bent")
-    arm = six_joint_arm(chain)
-    found = six_joint_solutions(arm, FLIP, np.array([0.3, -0.2, 0.1]))
-    expected = newton_solutions(chain, FLIP, np.array([0.3, -0.2, 0.1]))
-    assert len(expected) >= 2
+    found = six_joint_solutions(six_joint_arm(chain), FLIP, np.array(p))
+    expected = newton_solutions(chain, FLIP, np.array(p))
+    assert len(expected) >= 4
     assert all(is_among(other, found) for other in expected)
 
 
