@@ -12,6 +12,7 @@ from types import ModuleType
 
 _MEGABYTE = 1024**2
 LIBRARIES = {
+    "matplotlib": 150 * _MEGABYTE,
     "numba": 200 * _MEGABYTE,
     "pydrake": 200 * _MEGABYTE,
     "scipy.linalg": 150 * _MEGABYTE,
@@ -29,6 +30,8 @@ COMPILING = 450 * _MEGABYTE
 THREAD = 140 * _MEGABYTE
 """Address space that a thread takes: its stack, and the heap of its own that the C library reserves
 for it [bytes]."""
+_NO_THREAD = ("can't start new thread", "can't allocate lock", "can't allocate read lock")
+"""What Python says where there is no room for a thread or its locks."""
 WANT_OF_MEMORY = (
     "the memory does not suffice. Score a coarser grid or fewer axes, or use a machine with more; "
     "`tcs score --dry-run` tells how much scores need."
@@ -92,7 +95,7 @@ def is_for_want_of_memory(error: BaseException) -> bool:
         isinstance(error, MemoryError)
         # Libraries that find no address space when they are loaded do not say so.
         or (isinstance(error, ImportError | OSError) and is_limited() and is_of_loading(error))
-        or (isinstance(error, RuntimeError) and str(error) == "can't start new thread")
+        or (isinstance(error, RuntimeError) and str(error) in _NO_THREAD)
         # Compiled modules that find no memory while they are imported.
         or (isinstance(error, SystemError) and str(error) == "error return without exception set")
     )

@@ -31,6 +31,7 @@ def test_what_fails_to_load_is_told_as_want_of_memory_only_with_a_limit(monkeypa
         OSError(12, "Cannot allocate memory"),
     ]
     assert not any(map(is_for_want_of_memory, errors))
+    assert is_for_want_of_memory(RuntimeError("can't allocate read lock"))
     monkeypatch.setattr("tcs.files.memory.is_limited", lambda: True)
     assert all(map(is_for_want_of_memory, errors))
     assert not is_for_want_of_memory(ImportError("No module named 'yaml'"))
