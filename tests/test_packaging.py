@@ -17,8 +17,8 @@ CHECKOUT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((CHECKOUT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 DATA_PARTS = ("models", "tasks")
 
-# Distributions whose module is called otherwise; one that is found by its files alone, and one
-# that trimesh imports for us.
+# Distributions whose module is called otherwise; one that is found by its files alone, and those
+# that trimesh and uvicorn import for us.
 MODULE_OF = {
     "drake": "pydrake",
     "pillow": "PIL",
@@ -26,7 +26,7 @@ MODULE_OF = {
     "scikit-learn": "sklearn",
     "eclipse-zenoh": "zenoh",
 }
-WITHOUT_MODULE = {"example-robot-data", "pycollada"}
+WITHOUT_MODULE = {"example-robot-data", "pycollada", "httptools", "uvloop"}
 
 
 def dependencies() -> set[str]:
@@ -42,7 +42,7 @@ def of_extras() -> set[str]:
         for line in extras[name]
     ]
     names = {re.split(r"[^\w-]", line)[0] for line in lines}
-    return {MODULE_OF.get(name, name) for name in names}
+    return {MODULE_OF.get(name, name) for name in names - WITHOUT_MODULE}
 
 
 def imported_modules() -> set[str]:
