@@ -59,6 +59,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "optimum": (),
     "toc": (),
     "placing": (),
+    "obstacles": (),
     "first_run": (),
     "viewer": ("--scores", SCORES),
     "live_page": (),

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from tcs.model.robots.fitting.bounding import enclose
-from tcs.model.robots.fitting.growth import grown
+from tcs.model.robots.fitting.growth import grown, sums_before
 from tcs.model.robots.primitives import Primitive
 
 FloatArray = NDArray[np.float64]
@@ -34,7 +34,7 @@ def fillers(
         bare[tuple(cells[shape.contains(first + cells * pitch)].T)] = False
     rng, found = np.random.default_rng(0), []
     while bare.any():
-        boxes = grown(~hollow, np.argwhere(bare), rng)
+        boxes = grown(sums_before(~hollow), np.argwhere(bare), rng)
         counts = [int(bare[_slices(box)].sum()) for box in boxes]
         box = boxes[int(np.argmax(counts))]
         bare[_slices(box)] = False

@@ -57,22 +57,32 @@ def boxes_in(
     free = outside <= protrusion
     cells = np.clip(np.rint((seeds @ R - low) / solid.pitch).astype(np.int64), 0, count - 1)
     cells = cells[free[tuple(cells.T)]]
-    boxes = np.unique(grown(~free, cells, rng).reshape(-1, 6), axis=0).reshape(-1, 2, 3)
+    boxes = grown(sums_before(~free), cells, rng)
+    boxes = np.unique(boxes.reshape(-1, 6), axis=0).reshape(-1, 2, 3)
     return np.asarray(low + boxes * solid.pitch)
 
 
-def grown(blocked: BoolArray, seeds: IntArray, rng: np.random.Generator) -> IntArray:
+def sums_before(cells: BoolArray) -> NDArray[np.int32]:
+    """Return how many cells are set before each corner of a grid, shape (nx + 1, ny + 1, nz + 1).
+
+    Args:
+        cells: The cells, shape (nx, ny, nz).
+    """
+    counts = np.pad(cells.astype(np.int32), ((1, 0),) * 3)
+    for k in range(3):
+        np.cumsum(counts, axis=k, out=counts)
+    return counts
+
+
+def grown(counts: NDArray[np.int32], seeds: IntArray, rng: np.random.Generator) -> IntArray:
     """Return the first and last cells of boxes without blocked cells, shape (n, 2, 3).
 
     Args:
-        blocked: Cells that a box must not contain, shape (nx, ny, nz).
+        counts: Numbers of cells that a box must not contain, from `sums_before`.
         seeds: Cells from which the boxes grow, shape (n, 3).
         rng: Source of the order in which the sides of each box move.
     """
-    counts = np.pad(blocked.astype(np.int32), ((1, 0),) * 3)
-    for k in range(3):
-        np.cumsum(counts, axis=k, out=counts)
-    last, rows = np.array(blocked.shape) - 1, np.arange(len(seeds))
+    last, rows = np.array(counts.shape) - 2, np.arange(len(seeds))
     boxes = np.stack([seeds, seeds], axis=1)
     sides = np.argsort(rng.random((len(seeds), 6)), axis=1)
     for step in _STEPS:
