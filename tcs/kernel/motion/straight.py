@@ -206,6 +206,9 @@ def _follow(
     """
     for r in range(3):
         line.target[r] = line.p_AT[r] + fraction * offset[r]
+    for k in range(7):
+        # Joints locked in an earlier step are at their limit there.
+        after[k] = before[k]
     while True:
         for k in range(7):
             # Joints locked in this step start at their limit.

@@ -34,9 +34,9 @@ def chain():
     return drake_arm("pr2 left").chain
 
 
-def follow(ready, work, q, offset, *, pieces=20, fastest=UNLIMITED):
-    """Return outcome, points and tangents of a straight motion."""
-    points, tangents = np.empty((pieces + 1, 7)), np.empty((pieces + 1, 7))
+def follow(ready, work, q, offset, *, pieces=20, fastest=UNLIMITED, before=np.nan):
+    """Return outcome, points and tangents of a straight motion, filled with `before` before it."""
+    points, tangents = np.full((pieces + 1, 7), before), np.full((pieces + 1, 7), before)
     line = new_straight_workspace()
     outcome = straight_motion(ready, work, line, q, offset, fastest, points, tangents)
     return outcome, points, tangents
@@ -63,6 +63,26 @@ def test_the_tool_stays_on_the_line_between_the_points_too(chain, rng):
             np.testing.assert_allclose(R, R0, atol=2 * OFF_LINE)
             assert np.all((spline(s) > ready.lower - 1e-9) & (spline(s) < ready.upper + 1e-9))
     assert done > 5
+
+
+def test_a_joint_rests_at_its_limit_whatever_was_in_memory_before(chain, rng):
+    ready, work, _ = prepared(bare(chain))
+    resting = 0
+    for _ in range(200):
+        q = within_limits(rng, chain)
+        joint = rng.choice(np.flatnonzero(np.isfinite(chain.upper)))
+        q[joint] = chain.upper[joint] - 1e-3
+        if posture_contact(ready, work, q) != NO_PAIR:
+            continue
+        offset = rng.normal(size=3)
+        offset *= 0.05 / np.linalg.norm(offset)
+        outcomes = [follow(ready, work, q, offset, before=value) for value in (np.nan, 0.0, 1.0)]
+        assert len({outcome for outcome, *_ in outcomes}) == 1
+        if outcomes[0][0] == DONE:
+            points = outcomes[0][1]
+            assert all(np.array_equal(points, other) for _, other, _ in outcomes[1:])
+            resting += int(np.sum(points[:, joint] == chain.upper[joint]) > 3)
+    assert resting > 3
 
 
 def test_a_plate_blocks_the_line_and_is_named(chain):
