@@ -10,22 +10,9 @@ import pytest
 from tcs.motion.curves import Curve
 from tcs.motion.timing import timed
 from tcs.motion.tour import EXACT, REST, best_tour
+from tests.motion.paths import bent, straight
 
 VELOCITY, ACCELERATION = np.full(7, 2.0), np.full(7, 4.0)
-
-
-def straight(length):
-    """Return a straight curve of joint 1."""
-    direction = np.eye(7)[0]
-    ends = np.array([0 * direction, length * direction])
-    return Curve(np.array([0.0, length]), ends, np.array([direction, direction]))
-
-
-def rounded():
-    """Return two straight pieces with a parabola between them."""
-    a, b = np.eye(7)[0], np.eye(7)[1]
-    q = np.array([0 * a, 0.8 * a, a + 0.2 * b, a + b])
-    return Curve(np.array([0.0, 0.8, 1.2, 2.0]), q, np.array([a, a, b, b]))
 
 
 @pytest.mark.parametrize(("length", "seconds"), [(0.25, 0.5), (3.0, 2.0)])
@@ -37,8 +24,8 @@ def test_a_straight_line_takes_the_time_of_a_trapezoid(length, seconds):
 
 
 def test_samples_keep_the_limits_and_stop_at_both_ends():
-    timing = timed(rounded(), VELOCITY, ACCELERATION)
-    np.testing.assert_array_equal(timing.positions[[0, -1]], rounded().q[[0, -1]])
+    timing = timed(bent(), VELOCITY, ACCELERATION)
+    np.testing.assert_array_equal(timing.positions[[0, -1]], bent().q[[0, -1]])
     assert np.all(timing.velocities[[0, -1]] == 0.0)
     assert np.all(np.abs(timing.velocities) <= VELOCITY + 1e-9)
     steps = np.diff(timing.times)[:, None]
@@ -59,13 +46,13 @@ def test_random_curves_keep_the_limits(rng):
 
 
 def test_scaling_the_limits_scales_the_time():
-    slow = timed(rounded(), VELOCITY, ACCELERATION).duration
-    fast = timed(rounded(), 2.0 * VELOCITY, 4.0 * ACCELERATION).duration
+    slow = timed(bent(), VELOCITY, ACCELERATION).duration
+    fast = timed(bent(), 2.0 * VELOCITY, 4.0 * ACCELERATION).duration
     assert fast == pytest.approx(slow / 2.0, rel=1e-3)
 
 
 def test_reversing_a_curve_reverses_its_points():
-    curve = rounded()
+    curve = bent()
     back = curve.reverse()
     at = np.linspace(0.0, 1.0, 7)
     for piece in range(curve.pieces):
