@@ -257,16 +257,16 @@ def test_all_goals_are_cancelled(ros, counting):
 
 
 @pytest.mark.parametrize(
-    ("name", "request_text", "line"),
+    ("number", "name", "request_text", "line"),
     [
-        ("select", "{}", "'select' is not the name of a job. Known: evaluate, "),
-        ("score", "[", "request is not valid JSON"),
-        ("score", '{"tsak": 1}', "unknown key 'tsak'"),
-        ("plan", json.dumps({"file": "0" * 64}), "no score file 000000000000"),
+        (10, "select", "{}", "'select' is not the name of a job. Known: evaluate, "),
+        (11, "score", "[", "request is not valid JSON"),
+        (12, "score", '{"tsak": 1}', "unknown key 'tsak'"),
+        (13, "plan", json.dumps({"file": "0" * 64}), "no score file 000000000000"),
     ],
 )
-def test_goals_that_are_refused_are_aborted_with_a_line(ros, name, request_text, line):
-    goal = Goal(ros, hash((name, request_text)) % 200 + 10, name, request_text)
+def test_goals_that_are_refused_are_aborted_with_a_line(ros, number, name, request_text, line):
+    goal = Goal(ros, number, name, request_text)
     ended = goal.result()()
     assert (ended.status, ended.result.state) == (6, "failed")
     assert line in ended.result.problem
