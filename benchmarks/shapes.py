@@ -4,8 +4,9 @@ Usage: python benchmarks/shapes.py [--robots pr2,baxter] [--postures 10000] [--e
            [--seed 0]
 
 Of random postures whose meshes are free of contact: the fraction that the shapes call blocked, by
-self-collision and by random boxes, and the pairs that block most. Conversely: pairs that need no
-check whose meshes cross in some postures. Arm and torso move within the joint limits, everything
+self-collision and by random boxes, and the pairs that block most. A pair that a table of distances
+shows to be apart is not blocked. Conversely: pairs that need no check whose meshes cross in some
+postures. Arm and torso move within the joint limits, everything
 else keeps its posture; what is outside a range of the robot file counts as blocked. Coal measures
 the meshes. The results depend on the seed alone, not on the machine.
 """
@@ -25,6 +26,7 @@ from table import cell, header, parser, record, row, save
 
 from tcs.kernel.collide import BOUND, CENTRE, ROTATION, closer
 from tcs.model.robots import Primitive, RobotFile, load_robot, robot_names
+from tcs.model.robots.distances import tables_in_force
 from tcs.model.robots.extras import model_with_extras
 from tcs.model.robots.fitting.enclosure import surfaces_to_enclose
 from tcs.model.robots.self_collision import sample_positions
@@ -125,7 +127,7 @@ def blocked(line: str, bodies: Bodies, postures: int, seed: int) -> list[list[st
     """Print what shapes block although meshes are free, and return the worst pairs."""
     positions, poses = draw(bodies, postures, seed)
     robot, checked = bodies.robot, set(bodies.pairs())
-    judge, limits = Contacts(bodies, poses), robot.joint_limits()
+    judge, limits = Contacts(bodies, poses, positions), robot.joint_limits()
     narrowed = {tuple(sorted(p)) for g in robot.disabled_groups if g.ranges for p in g.pairs}
     exempt_pairs = {tuple(sorted(pair)) for pair in robot.disabled_pairs}
     boxes = Boxes(bodies, poses, seed)
@@ -222,11 +224,16 @@ def body_poses(model: Urdf, positions: Mapping[str, FloatArray], postures: int) 
 
 
 class Contacts:
-    """Pairs of bodies whose shapes are closer than the self margin."""
+    """Pairs of bodies whose shapes are closer than the self margin.
 
-    def __init__(self, bodies: Bodies, poses: Poses) -> None:
+    Those that a table of distances shows to be apart are not among them.
+    """
+
+    def __init__(self, bodies: Bodies, poses: Poses, positions: Mapping[str, FloatArray]) -> None:
         """Pack the shapes of each body, and place a ball around them in every posture."""
         self._poses, self._margin = poses, bodies.robot.self_margin
+        self._positions = positions
+        self._tables = {tuple(sorted(t.pair)): t for t in tables_in_force(bodies.robot)}
         shapes: dict[str, list[Primitive]] = {}
         for shape in bodies.robot.load_primitives():
             shapes.setdefault(shape.body, []).append(shape)
@@ -235,7 +242,18 @@ class Contacts:
 
     def touching(self, i: int, pairs: Iterable[BodyPair]) -> set[BodyPair]:
         """Return which of some pairs of bodies have shapes in contact in posture i."""
-        return {pair for pair in pairs if self._are_near(pair, i) and self._touch(pair, i)}
+        return {
+            pair
+            for pair in pairs
+            if self._are_near(pair, i) and self._touch(pair, i) and not self._are_apart(pair, i)
+        }
+
+    def _are_apart(self, pair: BodyPair, i: int) -> bool:
+        table = self._tables.get(pair)
+        if table is None:
+            return False
+        at = {name: float(self._positions[name][i]) for name in table.joints}
+        return table.bound(at) >= self._margin
 
     def _ball(self, body: str) -> tuple[FloatArray, float]:
         """Return the centres [m], shape (postures, 3), and the radius of a ball around a body."""

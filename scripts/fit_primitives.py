@@ -15,6 +15,13 @@
                                                     splits up to so many that protrude most; without
                                                     bodies, those that scripts/fits.yaml names
 
+    python scripts/fit_primitives.py ur5 --distances
+                                                    measures the distances of surfaces of pairs of
+                                                    bodies with at most three joints between them,
+                                                    and writes them beside the primitives; of pairs
+                                                    such as forearm_link/wrist_2_link only these,
+                                                    and keeps the tables of the others
+
 The results are deterministic. Each command takes a few minutes; pairs depend on the primitives.
 The last lines say how many postures the shapes block although the surfaces are free of
 self-collision, and of random boxes.
@@ -25,6 +32,7 @@ from __future__ import annotations
 import re
 import sys
 from dataclasses import replace
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +48,7 @@ from tcs.model.robots import (
     read_primitives,
     write_primitives,
 )
+from tcs.model.robots.distances import read_tables, write_tables
 from tcs.model.robots.fitting import (
     Part,
     Spots,
@@ -51,11 +60,12 @@ from tcs.model.robots.fitting import (
     target_of,
     tightened,
 )
+from tcs.model.robots.measured_distances import measured_tables
 from tcs.model.robots.self_collision import blocked_at_boxes, blocked_by_shapes, renewed_groups
 
 FITS = Path(__file__).parent / "fits.yaml"
 """Bodies of the shipped robots that are not fitted as usual."""
-OPTIONS = ("--pairs", "--parts", "--tighten")
+OPTIONS = ("--pairs", "--parts", "--tighten", "--distances")
 _NUMBERS = re.compile(r"([1-9]\d*)(?:\+([1-9]\d*))?")
 """Number of shapes of a body, and of patches."""
 
@@ -63,6 +73,10 @@ _NUMBERS = re.compile(r"([1-9]\d*)(?:\+([1-9]\d*))?")
 def main() -> int:
     """Rewrite primitives or pairs of the robot given on the command line."""
     names = [a for a in sys.argv[1:] if a not in OPTIONS and "=" not in a]
+    pairs: list[list[str]] = []
+    if "--distances" in sys.argv:
+        pairs = [a.split("/") for a in names if a.count("/") == 1 and not a.endswith(".yaml")]
+        names = [a for a in names if a.split("/") not in pairs]
     more = [a.split("=") for a in sys.argv[1:] if "=" in a]
     are_numbers = all(len(m) == 2 and _NUMBERS.fullmatch(m[1]) for m in more)
     if "--tighten" in sys.argv:
@@ -77,6 +91,8 @@ def main() -> int:
             if path.suffix != ".yaml":
                 path = data_folder() / "models" / "robots" / f"{robot.name}.yaml"
             rewrite_pairs(robot, path)
+        elif "--distances" in sys.argv:
+            write_distances(robot, pairs)
         elif "--parts" in sys.argv:
             shapes = refit_parts(robot, read_primitives(Path(robot.primitives)), parts_of(robot))
             write_primitives(Path(robot.primitives), shapes)
@@ -117,6 +133,38 @@ def rewrite_primitives(robot: RobotFile) -> None:
             f"| {found.body} | {len(fit.primitives)} | {fit.hull * 1e3:.3f} "
             f"| {fit.union * 1e3:.3f} | {fit.excess:.2f} |"
         )
+
+
+def write_distances(robot: RobotFile, pairs: list[list[str]]) -> None:
+    """Measure the tables of distances, of all pairs or some, and write them beside the primitives.
+
+    With some, the tables of the others stay, after those that are new.
+    """
+    primitives = Path(robot.primitives)
+    path = primitives.with_name(f"{primitives.stem.removesuffix('_primitives')}_distances.npz")
+
+    def say(pair: tuple[str, str], share: float) -> None:
+        print(f"{pair[0]} / {pair[1]}: shapes block {share:.2%} of postures", file=sys.stderr)
+
+    only = [frozenset(pair) for pair in pairs]
+    tables = measured_tables(robot, only=only or None, on_pair=say)
+    if only and path.exists():
+        tables += tuple(t for t in read_tables(path) if frozenset(t.pair) not in only)
+    write_tables(path, tables, measured_from(robot))
+    print(f"{path.name}, {path.stat().st_size / 1e3:.0f} kB")
+    print_blocked(robot.model_copy(update={"distances": str(path)}))
+
+
+def measured_from(robot: RobotFile) -> str:
+    """Return the URDF of a robot and the packages of it and its meshes, with their versions."""
+    text = robot.urdf + robot.urdf_path().read_text(encoding="utf-8", errors="replace")
+    found = []
+    for package in sorted(set(re.findall(r"package://([^/\"]+)", text))):
+        try:
+            found.append(f"{package} {version(package)}")
+        except PackageNotFoundError:
+            found.append(package)
+    return f"{Path(robot.urdf).name}; {', '.join(found)}; fit_primitives.py --distances"
 
 
 def chosen_fits(robot: RobotFile) -> dict[str, Target | None]:

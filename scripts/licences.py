@@ -15,7 +15,11 @@ CHECKOUT = Path(__file__).resolve().parents[1]
 PAGE = CHECKOUT / "THIRD_PARTY.md"
 TOOLS = {"benchmarks", "dev", "docs"}
 """Extras for work on tcs itself, whose packages do not come with tcs."""
-STATED = {"hello-robot-stretch-urdf": "BSD-3-Clause-Clear", "pyglet": "BSD-3-Clause"}
+STATED = {
+    "cmeel-qhull": "Qhull",
+    "hello-robot-stretch-urdf": "BSD-3-Clause-Clear",
+    "pyglet": "BSD-3-Clause",
+}
 """Licences of packages whose metadata have none, as their licence files say."""
 FIRST = """\
 # Third parties

@@ -23,13 +23,13 @@ SPHERE, CAPSULE, BOX = 0, 1, 2
 
 
 class Chain(NamedTuple):
-    """A serial arm of six or seven joints, each about or along the z axis of its own link frame.
+    """A serial arm of five to seven joints, each about or along the z axis of its own link frame.
 
     X_AL1 = F[0] Rz(q1), X_ALi = X_AL(i-1) F[i-1] Rz(qi), X_AT = X_AL7 F[7], with a translation by
     `slides` times qi along z in place of Rz(qi) for a prismatic joint.
 
     An arm of six joints has a further joint before its first one, about the same axis, which has no
-    limits and remains at 0: its own joints are q2 to q7.
+    limits and remains at 0: its own joints are q2 to q7. One of five has two such joints.
     """
 
     R: FloatArray
@@ -41,7 +41,7 @@ class Chain(NamedTuple):
     upper: FloatArray
     """Upper joint limits [rad], shape (7,); +inf where continuous."""
     joints: int = 7
-    """Number of joints of the arm, 6 or 7."""
+    """Number of joints of the arm, 5 to 7."""
     slides: FloatArray = np.zeros(7)
     """Motion of each prismatic joint per unit [m/m], 0 for a revolute joint, shape (7,). Coupled
     joints count as one, whose motion is the sum of theirs."""
@@ -71,11 +71,41 @@ class Shapes(NamedTuple):
     """Centres [m], shape (states, n, 3)."""
 
 
+class BodyDistances(NamedTuple):
+    """Tables of lower bounds of the distance of two bodies of the robot.
+
+    The cells of a table divide a full turn of two joints, from 0 on. The distance decreases by at
+    most the reach of a joint times its motion from the centre of a cell.
+    """
+
+    body: IntArray
+    """Indices of the two bodies in the lowered scene's list of names, shape (n, 2)."""
+    joint: IntArray
+    """Indices of the two joints in the chain, 0 .. 6, shape (n, 2)."""
+    size: IntArray
+    """Number of cells of a full turn of either joint, shape (n, 2)."""
+    reach: FloatArray
+    """Reach of either joint [m/rad], shape (n, 2)."""
+    cells: NDArray[np.uint8]
+    """Distances at the centres of the cells, in steps of 0.2 mm, rounded down; row by row, table by
+    table."""
+
+
+NO_DISTANCES = BodyDistances(
+    np.empty((0, 2), np.int64),
+    np.empty((0, 2), np.int64),
+    np.empty((0, 2), np.int64),
+    np.empty((0, 2)),
+    np.empty(0, np.uint8),
+)
+
+
 class SceneArrays(NamedTuple):
     """Everything needed to score any initial configuration of one scene against its goals.
 
     Shapes i and j collide when they come closer than `max(margin, pad_i + pad_j)`; two shapes of
-    the robot, `max(self_margin, pad_i + pad_j)`.
+    the robot, `max(self_margin, pad_i + pad_j)`, unless a table of distances shows that their
+    bodies keep that distance.
     """
 
     chain: Chain
@@ -108,6 +138,8 @@ class SceneArrays(NamedTuple):
     freedom: FloatArray = np.empty((0, 9))
     """What is free about each goal, in the columns of `tcs.kernel.freedom.forms`, shape
     (goals, 9); no rows if every goal is a single pose."""
+    distances: BodyDistances = NO_DISTANCES
+    """Tables of distances of bodies of the robot."""
 
 
 class GridArrays(NamedTuple):

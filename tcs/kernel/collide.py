@@ -86,6 +86,15 @@ def closer(a: FloatArray, i: int, b: FloatArray, j: int, gap: float) -> bool:
 @inner
 def _segments(a: FloatArray, i: int, half_a: float, b: FloatArray, j: int, half_b: float) -> float:
     """Return the squared distance between two segments along the shapes' z axes [m^2]."""
+    dx, dy, dz = between_segments(a, i, half_a, b, j, half_b)
+    return dx * dx + dy * dy + dz * dz
+
+
+@inner
+def between_segments(
+    a: FloatArray, i: int, half_a: float, b: FloatArray, j: int, half_b: float
+) -> tuple[float, float, float]:
+    """Return the shortest vector from segment i to segment j along the shapes' z axes [m]."""
     ux, uy, uz = a[i, ROTATION + 2], a[i, ROTATION + 5], a[i, ROTATION + 8]
     vx, vy, vz = b[j, ROTATION + 2], b[j, ROTATION + 5], b[j, ROTATION + 8]
     x, y, z = (
@@ -107,13 +116,21 @@ def _segments(a: FloatArray, i: int, half_a: float, b: FloatArray, j: int, half_
     elif sine <= PARALLEL:
         s = min(max(t * c + along_a, -half_a), half_a)
         t = min(max(s * c - along_b, -half_b), half_b)
-    dx, dy, dz = x + t * vx - s * ux, y + t * vy - s * uy, z + t * vz - s * uz
-    return dx * dx + dy * dy + dz * dz
+    return x + t * vx - s * ux, y + t * vy - s * uy, z + t * vz - s * uz
 
 
 @inner
 def _segment_box(a: FloatArray, i: int, half: float, b: FloatArray, j: int) -> float:
     """Return the squared distance from a segment along shape i's z axis to box j [m^2]."""
+    x, y, z = between_box_and_segment(a, i, half, b, j)
+    return x * x + y * y + z * z
+
+
+@inner
+def between_box_and_segment(
+    a: FloatArray, i: int, half: float, b: FloatArray, j: int
+) -> tuple[float, float, float]:
+    """Return the shortest vector from box j to a segment along shape i's z axis, in the box [m]."""
     x, y, z = (
         a[i, CENTRE] - b[j, CENTRE],
         a[i, CENTRE + 1] - b[j, CENTRE + 1],
@@ -143,8 +160,8 @@ def _line_box(
     px: float, py: float, pz: float,
     dx: float, dy: float, dz: float,
     hx: float, hy: float, hz: float,
-) -> float:  # fmt: skip
-    """Return the squared distance between p + t d, t in [0, 1], and the box of half sizes h.
+) -> tuple[float, float, float]:  # fmt: skip
+    """Return the shortest vector from the box of half sizes h to p + t d, t in [0, 1].
 
     Half the derivative of the squared distance, g(t) = d . beyond(p + t d), grows with t and is
     linear between the values of t at which a coordinate passes a face: find the interval between
@@ -175,10 +192,7 @@ def _line_box(
                     else:
                         high, g_high = cut, g
             t = low - g_low * (high - low) / (g_high - g_low)
-    ex = _beyond(px + t * dx, hx)
-    ey = _beyond(py + t * dy, hy)
-    ez = _beyond(pz + t * dz, hz)
-    return ex * ex + ey * ey + ez * ez
+    return _beyond(px + t * dx, hx), _beyond(py + t * dy, hy), _beyond(pz + t * dz, hz)
 
 
 @inner
@@ -315,6 +329,6 @@ def _edges_box(a: FloatArray, i: int, b: FloatArray, j: int) -> float:
                 px = c[0] + sign_f * e[f, 0] + sign_g * e[g, 0] - e[m, 0]
                 py = c[1] + sign_f * e[f, 1] + sign_g * e[g, 1] - e[m, 1]
                 pz = c[2] + sign_f * e[f, 2] + sign_g * e[g, 2] - e[m, 2]
-                square = _line_box(px, py, pz, 2 * e[m, 0], 2 * e[m, 1], 2 * e[m, 2], hx, hy, hz)
-                least = min(least, square)
+                x, y, z = _line_box(px, py, pz, 2 * e[m, 0], 2 * e[m, 1], 2 * e[m, 2], hx, hy, hz)
+                least = min(least, x * x + y * y + z * z)
     return least

@@ -13,6 +13,7 @@ import numpy as np
 from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant, jit
 from tcs.kernel.collide import BOUND, CENTRE, closer, move, spheres_overlap
+from tcs.kernel.distances import are_apart
 from tcs.kernel.kinematics import link_poses
 from tcs.kernel.problem import Problem
 
@@ -132,7 +133,7 @@ def gripper_contact_at(
     problem: Problem, work: Workspace, state: int, R: FloatArray, p: FloatArray
 ) -> int:
     """Return the first contact of the gripper with the environment, the tool at a pose in W."""
-    _place_gripper(problem, work, R, p)
+    place_gripper(problem, work, R, p)
     arm, environment, gaps = work.arm, problem.environment[state], problem.gap_environment
     box = len(problem.link_body)
     for g in range(problem.gripper_groups):
@@ -153,7 +154,7 @@ def gripper_body_contact(problem: Problem, work: Workspace, body_A: FloatArray) 
 
     The gripper's groups in A remain in `work.arm`.
     """
-    _place_gripper(problem, work, work.R_AG, work.p_AG)
+    place_gripper(problem, work, work.R_AG, work.p_AG)
     arm, gaps = work.arm, problem.gap_body
     box, others = len(problem.link_body), len(problem.body_body)
     for g in range(problem.gripper_groups):
@@ -169,7 +170,7 @@ def gripper_body_contact(problem: Problem, work: Workspace, body_A: FloatArray) 
 
 
 @inner
-def _place_gripper(problem: Problem, work: Workspace, R: FloatArray, p: FloatArray) -> None:
+def place_gripper(problem: Problem, work: Workspace, R: FloatArray, p: FloatArray) -> None:
     """Place the groups of the last link such that the tool is at the pose (R, p)."""
     R7, p7 = work.link_R[7], work.link_p[7]
     F, f = problem.chain_R[7], problem.chain_p[7]
@@ -192,16 +193,18 @@ def arm_contact(problem: Problem, work: Workspace, body_A: FloatArray, q: FloatA
     arm, environment, last, touching = work.arm, work.environment_A, work.last, work.touching
     gap_environment, gap_body, gap_arm = problem.gap_environment, problem.gap_body, problem.gap_arm
     near, near_count = work.near, work.near_count[0]
-    groups, body_groups = len(problem.link_first) - 1, len(problem.body_first) - 1
+    distances, link_body, first = problem.distances, problem.link_body, problem.link_first
+    body_body, body_first = problem.body_body, problem.body_first
+    groups, body_groups = len(first) - 1, len(body_first) - 1
     boxes, body_boxes = len(problem.link_body), len(problem.body_body)
     link_poses(problem.chain_R, problem.chain_p, q, work.link_R, work.link_p)
     if len(problem.coupled):
         place_coupled_links(problem, work, q)
     partner, i, j = last[0], last[1], last[2]
-    if partner >= 0 and pair_touches(problem, work, body_A, partner, i, j):
+    if partner >= 0 and pair_touches(problem, work, body_A, q, partner, i, j):
         return pair_code(problem, partner, i, j)
     for g in range(problem.gripper_groups, groups):
-        box = boxes + g
+        box, body = boxes + g, link_body[first[g]]
         _place_group(problem, work, g)
         for n in range(near_count):
             j = near[n]
@@ -218,6 +221,7 @@ def arm_contact(problem: Problem, work: Workspace, body_A: FloatArray, q: FloatA
             if (
                 gap > 0.0
                 and spheres_overlap(arm, box, body_A, body_boxes + h, gap)
+                and not are_apart(distances, body, body_body[body_first[h]], q, gap)
                 and _body_touches(problem, work, body_A, g, h)
             ):
                 last[0], last[1], last[2] = BODY, touching[0], touching[1]
@@ -227,6 +231,7 @@ def arm_contact(problem: Problem, work: Workspace, body_A: FloatArray, q: FloatA
             if (
                 gap > 0.0
                 and spheres_overlap(arm, box, arm, boxes + h, gap)
+                and not are_apart(distances, body, link_body[first[h]], q, gap)
                 and _arm_touches(problem, work, g, h)
             ):
                 last[0], last[1], last[2] = ARM, touching[0], touching[1]
@@ -265,17 +270,36 @@ def at_goal(problem: Problem, work: Workspace) -> bool:
 
 @inner
 def pair_touches(
-    problem: Problem, work: Workspace, body_A: FloatArray, partner: int, i: int, j: int
+    problem: Problem,
+    work: Workspace,
+    body_A: FloatArray,
+    q: FloatArray,
+    partner: int,
+    i: int,
+    j: int,
 ) -> bool:
-    """Return whether arm shape i touches shape j of a partner, for the current link poses."""
-    arm = work.arm
+    """Return whether arm shape i touches shape j of a partner.
+
+    Args:
+        problem: The scene.
+        work: Workspace with the current link poses.
+        body_A: The robot's other shapes in A.
+        q: Joint angles of these poses [rad], shape (7,).
+        partner: Partner of the arm.
+        i: Shape of the arm.
+        j: Shape of the partner.
+    """
+    arm, distances, body = work.arm, problem.distances, problem.link_body[i]
     _place_link(problem, work, i)
     if partner == ENVIRONMENT:
         return closer(arm, i, work.environment_A, j, problem.gap_environment[i, j])
     if partner == BODY:
-        return closer(arm, i, body_A, j, problem.gap_body[i, j])
+        gap = problem.gap_body[i, j]
+        other = problem.body_body[j]
+        return closer(arm, i, body_A, j, gap) and not are_apart(distances, body, other, q, gap)
     _place_link(problem, work, j)
-    return closer(arm, i, arm, j, problem.gap_arm[i, j])
+    gap, other = problem.gap_arm[i, j], problem.link_body[j]
+    return closer(arm, i, arm, j, gap) and not are_apart(distances, body, other, q, gap)
 
 
 @inner

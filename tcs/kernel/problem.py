@@ -19,7 +19,8 @@ from tcs.kernel.arrays import (
 )
 from tcs.kernel.collide import BOUND, CENTRE, pack
 from tcs.kernel.dexterity import DEFAULT_MEASURE, Dexterity, dexterity
-from tcs.kernel.freedom.forms import FreeGoals, free_goals
+from tcs.kernel.distances import DistanceTables, arranged
+from tcs.kernel.freedom.goals import FreeGoals, axis_left_free, free_goals
 from tcs.kernel.groups import first_rows, with_boxes, with_group_rows
 
 UNCHECKED = -1.0
@@ -109,12 +110,17 @@ class Problem(NamedTuple):
     """Goal positions in W [m], shape (environment states, goals, 3)."""
     freedom: FreeGoals
     """What is free about the goals, which are their nominal poses."""
+    turn: FloatArray
+    """Unit axis in T about which all goals leave the tool free to rotate, if an arm of five joints
+    depends on it, else zeros, shape (3,)."""
     base_x: FloatArray
     """As in `GridArrays`, also the fields below."""
     base_y: FloatArray
     base_yaw: FloatArray
     torso_levels: int
     environment_states: int
+    distances: DistanceTables
+    """Tables of distances of bodies of the robot."""
 
 
 def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_MEASURE) -> Problem:
@@ -142,6 +148,7 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
     mount, body_body = scene.body.frame.astype(np.int64), scene.body.body.astype(np.int64)
     link_first, body_first = first_rows(frame, link_body), first_rows(mount, body_body)
     packed = pack(scene.body)
+    robot_bodies = max(_count(scene.arm), _count(scene.body))
     return Problem(
         measure=dexterity(measure),
         arm=any_solver(scene.chain),
@@ -165,7 +172,7 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
         environment=pack(scene.environment),
         environment_body=scene.environment.body.astype(np.int64),
         environment_bodies=_count(scene.environment),
-        robot_bodies=max(_count(scene.arm), _count(scene.body)),
+        robot_bodies=robot_bodies,
         gap_environment=with_group_rows(
             _gaps(scene.arm_vs_environment[order], pads[0], pads[2], margin), link_first
         ),
@@ -185,11 +192,13 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
         goal_R=_own(scene.goal_R),
         goal_p=_own(scene.goal_p),
         freedom=free_goals(scene.freedom, scene.chain),
+        turn=axis_left_free(scene.freedom, scene.chain),
         base_x=_own(grid.base_x),
         base_y=_own(grid.base_y),
         base_yaw=_own(grid.base_yaw),
         torso_levels=grid.torso_levels,
         environment_states=grid.environment_states,
+        distances=arranged(scene.distances, robot_bodies),
     )
 
 

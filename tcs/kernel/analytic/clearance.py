@@ -24,6 +24,7 @@ from tcs.kernel.arrays import BOX, CAPSULE, FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant
 from tcs.kernel.collide import CENTRE, ROTATION, SIZE, TYPE, closer, move
 from tcs.kernel.contacts import ARM, ENVIRONMENT, NO_CONTACT, Workspace, arm_contact, at_goal
+from tcs.kernel.distances import may_come_apart
 from tcs.kernel.kinematics import copy_joints, link_poses
 from tcs.kernel.problem import Problem
 
@@ -247,9 +248,27 @@ def _stays_in_contact(
         other = _motion(problem, search, R, p, pair[1])
     if max(motion, other) < LEAST_MOTION:
         return True
-    return _touches(problem, R[0], p[0], work, body_A, pair[0], motion) and (
-        _touches(problem, R[1], p[1], work, body_A, pair[1], other)
+    return (
+        _touches(problem, R[0], p[0], work, body_A, pair[0], motion)
+        and _touches(problem, R[1], p[1], work, body_A, pair[1], other)
+        and not _table_may_clear(problem, search, top, pair[0])
+        and not _table_may_clear(problem, search, top, pair[1])
     )
+
+
+@inner
+def _table_may_clear(problem: Problem, search: Search, top: int, pair: IntArray) -> bool:
+    """Return whether a table of distances may clear a pair between the ends of an interval."""
+    if pair[0] == ENVIRONMENT:
+        return False
+    i, j = pair[1], pair[2]
+    if pair[0] == ARM:
+        other, gap = problem.link_body[j], problem.gap_arm[i, j]
+    else:
+        other, gap = problem.body_body[j], problem.gap_body[i, j]
+    distances, ends = problem.distances, search.ends_q[top]
+    n = distances.of_bodies[problem.link_body[i], other]
+    return n >= 0 and may_come_apart(distances, n, ends[0], ends[1], PATH, gap)
 
 
 @inner

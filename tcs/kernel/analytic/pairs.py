@@ -36,6 +36,8 @@ REFINEMENTS, MORE_REFINEMENTS = int_constant(3), int_constant(8)
 contacts the best solution lies next to one of them, and where joints move fast they move far from
 one sample to the next: both take more."""
 REFINE_SAMPLES = int_constant(8)
+QUICK_TRIES = int_constant(24)
+"""Candidates of a pose that a quick look checks for contacts, evenly among all."""
 WORTH = 1.00001
 """By what factor a solution found later must be better to replace one: isotropy counts to the sixth
 power here, and rounding joints to float32 costs up to 1e-7."""
@@ -236,6 +238,44 @@ def score_pair(
     for n in range(first, last):
         value = refine(problem, work, body_A, search, n, MORE_REFINEMENTS, value)
     return REACHED, NO_CONTACT
+
+
+@inner
+def quick_look(
+    problem: Problem, work: Workspace, body_A: FloatArray, least: float, search: Search
+) -> tuple[int, int]:
+    """Return REACHED if a sample of the free joint serves a goal, else a likely reason.
+
+    What lies between the samples is left out: `score_pair` finds more, at several times the cost.
+
+    Args:
+        problem: The scene.
+        work: Workspace with environment, base, gripper and goal in place.
+        body_A: The robot's other shapes in A at the current torso level.
+        least: Measure that the sample has to exceed; negative for any.
+        search: As filled by `out_of_reach`.
+
+    Returns:
+        Reason and contact code.
+    """
+    found = find_candidates(problem.arm, search, search.arc_count[0])
+    if not found:
+        return JOINT_LIMITS, NO_CONTACT
+    if least >= 0.0:
+        _measure_candidates(problem, search, NONE, found)
+        bound = least**6 if samples_hold_measure(problem) else least
+        winner, contact = best_free(problem, work, body_A, search, NONE, found, bound)
+        return REACHED if winner >= 0 else ARM_BLOCKED, contact
+    contact = NO_CONTACT
+    for n in range(0, found, 1 + found // QUICK_TRIES):
+        branch = problem.arm.branches[search.found_branch[n]]
+        sample_joints(problem.arm, search.goal, branch, search.found_angle[n], search.q)
+        code = arm_contact(problem, work, body_A, search.q)
+        if code == NO_CONTACT and at_goal(problem, work):
+            return REACHED, NO_CONTACT
+        if n == 0:
+            contact = code
+    return ARM_BLOCKED, contact
 
 
 @inner

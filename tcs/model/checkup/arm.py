@@ -14,6 +14,7 @@ from tcs.errors import ArmClassError
 from tcs.kernel.analytic.ik import sample_joints, wrist_goal
 from tcs.kernel.analytic.solver import FIRST, ArmSolver, arm_solver
 from tcs.kernel.arrays import Chain, FloatArray
+from tcs.kernel.five_joints.turned import turned_arm
 from tcs.kernel.lines import axis_distance
 from tcs.kernel.numeric.solutions import numeric_solutions
 from tcs.kernel.six_joints.arm import (
@@ -41,6 +42,7 @@ ClassName = Literal[
     "six-joint parallel-axes",
     "three prismatic joints",
     "six-joint elimination",
+    "five joints",
 ]
 
 _MEETING = (("2-3", (2, 3)), ("5-6-7", (5, 6, 7)), ("1-2-3", (1, 2, 3)), ("5-6", (5, 6)))
@@ -58,8 +60,9 @@ class ArmClass:
             the free joint. "six-joint spherical-wrist": of six joints, axes 1 and 2 meet, and so do
             axes 4, 5 and 6; "six-joint parallel-axes": axes 2, 3 and 4 are parallel, and axes 5 and
             6 meet. "three prismatic joints": three more are revolute. "six-joint elimination": any
-            other six revolute joints, whose solutions are all found by elimination. None: none of
-            these.
+            other six revolute joints, whose solutions are all found by elimination. "five joints":
+            solved with a rotation of the tool that goals leave free, as an arm of six. None: none
+            of these.
         reason: Why the arm is in no class, else empty.
         distances: Distance of axes from meeting in one point [m], by their numbers; None if two
             neighbours are parallel.
@@ -125,6 +128,8 @@ def arm_class(chain: Chain) -> ArmClass:
     """Return the class of an arm."""
     if chain.joints == 6:
         return _six_joint_class(chain)
+    if chain.joints == 5:
+        return _five_joint_class(chain)
     distances = {name: _distance_from_meeting(chain, axes) for name, axes in _MEETING}
     try:
         solver = arm_solver(chain)
@@ -154,6 +159,17 @@ def _six_joint_class(chain: Chain) -> ArmClass:
     elif has_spherical_wrist(arm):
         name = "six-joint spherical-wrist"
     return ArmClass(name, "", distances, arm, joints=6)
+
+
+def _five_joint_class(chain: Chain) -> ArmClass:
+    """Return the class of an arm of five joints, solved with the first axis of T that serves."""
+    reason = ""
+    for axis in np.eye(3):
+        try:
+            return ArmClass("five joints", "", {}, turned_arm(chain, axis), joints=5)
+        except ArmClassError as error:
+            reason = f"whatever axis of the tool goals leave free: {error}"
+    return ArmClass(None, reason, {}, None, joints=5)
 
 
 def round_trip(
@@ -220,8 +236,10 @@ def _solved(
 ) -> Iterable[FloatArray]:
     """Return the kernel's solutions for a tool pose [rad], each of shape (7,)."""
     if isinstance(solver, SixJointArm):
-        return six_joint_solutions(solver, X_AG.rotation().matrix(), X_AG.translation())
-    if chain.joints == 6:
+        found = six_joint_solutions(solver, X_AG.rotation().matrix(), X_AG.translation())
+        # Its last joint is the free rotation of an arm of five joints.
+        return found if chain.joints == 6 else found[:, :-1]
+    if chain.joints < 7:
         return ()
     if solver is None:
         return numeric_solutions(chain, X_AG.rotation().matrix(), X_AG.translation())

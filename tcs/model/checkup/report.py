@@ -124,7 +124,7 @@ class RobotCheck:
             )
         if self.fingers_along is not None:
             found.append(tool_axes_problem(self.robot, self.fingers_along))
-        if self.arm.joints == 6 and self.arm.solver is None:
+        if self.arm.joints < 7 and self.arm.solver is None:
             return (*found, self.arm.reason)
         lost = self.trip.samples - self.trip.recovered
         if lost and self.arm.solver is not None:
@@ -145,6 +145,11 @@ class RobotCheck:
         found = []
         if self.arm.solver is None and self.arm.joints == 7:
             found.append(f"{self.arm.reason} It is solved numerically, which takes longer.")
+        if self.arm.joints == 5:
+            found.append(
+                "the arm has five joints: goals must leave a rotation of the tool free, as with "
+                "'free: {rotation_about: [0, 0, 1]}' or 'free: orientation' in a task."
+            )
         bulky = [b for b in self.bodies if b.body in self._moved and b.excess > MOST_EXCESS]
         found += [
             f"the primitives of '{body.body}' have {body.excess:.2f} times the volume of its hull: "

@@ -12,13 +12,12 @@ import numpy as np
 from tcs.errors import RobotError, UnknownNameError
 from tcs.files.writing import scratch_folder
 from tcs.files.xml_documents import read_xml
+from tcs.model.robots.arm_joints import nearest_joints
 from tcs.model.robots.checks import check_robot
 from tcs.model.robots.draft_frames import on_floor, standing_bodies, with_goal_axes
 from tcs.model.robots.fitting import fit_robot, tightened
 from tcs.model.robots.primitives import Primitive, write_primitives
 from tcs.model.robots.robot_file import (
-    LEAST_JOINTS,
-    MOST_JOINTS,
     RobotFile,
 )
 from tcs.model.robots.self_collision import (
@@ -40,6 +39,8 @@ _VERTICAL = 0.99
 _ALLOWED = 0.01
 """Fraction of free postures that shapes may block before those of the bodies concerned are made
 tighter."""
+_LEFT = 0.5
+"""Fraction of those postures that pairs of bodies may block which are left as they are."""
 _SPLITS = 12
 """Shapes of such a body that may be split in two."""
 
@@ -93,10 +94,9 @@ def draft_robot(
 ) -> Draft:
     """Return a robot file for a URDF.
 
-    The arm consists of the seven revolute joints nearest the tool, or of six if only six in a row
-    lead there. The torso is a vertical
-    prismatic joint between root and arm. Every other joint is at 0 if its range includes values on
-    both sides of 0, else in the middle of its range. `fit_robot` gives the primitives and
+    The arm consists of the joints nearest the tool that `nearest_joints` takes. The torso is a
+    vertical prismatic joint between root and arm. Every other joint is at 0 if its range includes
+    values on both sides of 0, else in the middle of its range. `fit_robot` gives the primitives and
     `propose_disabled_pairs` the pairs that need no check. If the hand does not point along x of the
     tool, a frame with the axes that goals need is added.
 
@@ -109,8 +109,8 @@ def draft_robot(
 
     Raises:
         UnknownNameError: If tool, base or a link to ignore is not a link of the URDF.
-        RobotError: If the URDF or a mesh cannot be used, the base does not carry the tool, or fewer
-            than six revolute joints lead to it.
+        RobotError: If the URDF or a mesh cannot be used, the base does not carry the tool, or no
+            arm that is supported leads to it.
     """
     path = Path(os.path.realpath(resolve_uri(str(urdf), Path())))
     model = read_urdf(path)
@@ -164,7 +164,8 @@ def draft_robot(
         robot, axes = with_goal_axes(robot)
         found = _blocked(robot, steps)
         if not options.coarse and max(by.fraction for by in found) > _ALLOWED:
-            primitives = tightened(robot, primitives, _to_tighten(model, primitives, found))
+            splits = _to_tighten(model, primitives, found)
+            primitives = tightened(robot, primitives, splits)
             write_primitives(shapes, primitives)
             steps.repeat(len(found))
             # Others than those that chose the bodies.
@@ -172,7 +173,7 @@ def draft_robot(
         blocked, at_boxes = found
     worst = max(fits, key=lambda found: found.fit.excess)
     remarks = [
-        f"arm: the {len(arm)} revolute joints nearest '{tool}', from '{arm_base}' on: "
+        f"arm: the {len(arm)} {_kinds(arm)}joints nearest '{tool}', from '{arm_base}' on: "
         f"{', '.join(joint.name for joint in arm)}",
         f"torso: {f'{torso.name!r}' if torso else 'no vertical prismatic joint below the arm'}",
         f"tool: {axes}",
@@ -205,8 +206,8 @@ def _blocked(robot: RobotFile, steps: _Steps, seed: int = 0) -> tuple[Blocked, B
 def _to_tighten(
     model: Urdf, shapes: Iterable[Primitive], found: Iterable[Blocked]
 ) -> dict[str, int]:
-    """Return how many shapes to split of the bodies with meshes that block postures."""
-    blocking = {body for by in found for pair, _ in by.pairs for body in pair}
+    """Return how many shapes to split of the bodies with meshes that block most postures."""
+    blocking = {body for by in found for pair in by.worst(_LEFT * _ALLOWED) for body in pair}
     return {
         shape.body: _SPLITS
         for shape in shapes
@@ -242,6 +243,11 @@ class _Steps:
             self._report(self._done, self._total)
 
 
+def _kinds(arm: list[Joint]) -> str:
+    """Return the type of an arm's joints as a word before their name, empty if they differ."""
+    return "" if any(joint.type == "prismatic" for joint in arm) else "revolute "
+
+
 def _left_out(options: DraftOptions) -> list[str]:
     """Return remarks on surfaces that the primitives need not enclose."""
     remarks = []
@@ -264,23 +270,7 @@ def _arm(model: Urdf, tool: str, base: str | None) -> tuple[list[Joint], str, Jo
     if chain is None:
         raise RobotError(f"{where}: base '{base}' does not carry tool frame '{tool}'.")
     movable = [joint for joint in chain if joint.is_movable]
-    arm: list[Joint] = []
-    end = ""
-    for joint in reversed(movable):
-        if joint.type == "prismatic" or joint.mimic is not None:
-            obstacle = "mimics another" if joint.mimic else "is prismatic"
-            end = f"; '{joint.name}' before them {obstacle}"
-        if end or len(arm) == MOST_JOINTS:
-            break
-        arm.insert(0, joint)
-    if len(arm) < LEAST_JOINTS:
-        found = ", ".join(joint.name for joint in arm) or "none"
-        raise RobotError(
-            f"{where}: an arm of six or seven revolute joints is needed, but from "
-            f"'{base or model.root}' to tool frame '{tool}' only {len(arm)} in a row lead there "
-            f"({found}{end}): {LEAST_JOINTS - len(arm)} of the six freedoms of a goal would be "
-            "missing. Name another tool frame or base."
-        )
+    arm = nearest_joints(movable, f"{where}: from '{base or model.root}' to tool frame '{tool}'")
     exact = base is not None and movable == arm
     arm_base = str(base) if exact else arm[0].parent
     return arm, arm_base, _torso(model, arm[0].parent)

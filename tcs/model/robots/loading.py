@@ -15,7 +15,7 @@ from tcs.model.robots.robot_file import RobotFile
 ROBOTS = DataFiles("robot", "models/robots/*.yaml")
 BASED_ON = "based_on"
 """Key that names another robot file, which supplies the fields that this file lacks."""
-_PATH_FIELDS = ("urdf", "primitives")
+_PATH_FIELDS = ("urdf", "primitives", "distances")
 """Fields with a path relative to the robot file."""
 
 

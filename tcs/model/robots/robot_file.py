@@ -22,7 +22,7 @@ Name = Annotated[str, Field(min_length=1)]
 Range = tuple[JointPosition, JointPosition]
 Positions = Annotated[Mapping[Name, JointPosition], Entries]
 
-LEAST_JOINTS, MOST_JOINTS = 6, 7
+LEAST_JOINTS, MOST_JOINTS = 5, 7
 """Number of joints that an arm may have."""
 
 Rate = Annotated[float, Field(gt=0.0, le=1000.0)]
@@ -117,7 +117,7 @@ class RobotFile(Document):
     arm_base: Name
     """A: the link that carries joint 1 of the scored arm."""
     arm_joints: Annotated[tuple[Name, ...], Field(min_length=LEAST_JOINTS, max_length=MOST_JOINTS)]
-    """The six or seven joints of the scored arm, from A to the tool; of coupled ones, the one that
+    """The five to seven joints of the scored arm, from A to the tool; of coupled ones, the one that
     the others follow."""
     coupled: Annotated[Mapping[Name, Name], Entries] = {}
     """Joints that move as another one does, like the segments of a telescope, with the joint that
@@ -152,6 +152,8 @@ class RobotFile(Document):
     """Bodies that may touch the floor."""
     primitives: str
     """Path of the CSV file of the collision primitives."""
+    distances: str | None = None
+    """Path of the file of tables of distances of surfaces; None if shapes alone decide."""
     self_margin: Clearance = 0.001
     """Least clearance between two bodies of the robot: closer ones collide [m]."""
     disabled_groups: tuple[DisabledGroup, ...] = ()
@@ -200,7 +202,7 @@ class RobotFile(Document):
         return {leader: names for leader, names in found.items() if names}
 
     def require_seven_joints(self, purpose: str) -> None:
-        """Refuse an arm of six joints.
+        """Refuse an arm of fewer than seven joints.
 
         Args:
             purpose: What needs seven joints, as the subject of a sentence.

@@ -34,6 +34,7 @@ from tcs.model.scene.person.posture import Posture
 from tcs.model.scene.scene import Contact, Scene
 from tcs.model.scene.spec import SceneSpec
 from tcs.model.scene.surface_goals import with_surface_goals
+from tcs.model.scene.turning import axis_of_turn
 
 __all__ = [
     "EMPTY_ENVIRONMENT",
@@ -51,6 +52,7 @@ __all__ = [
     "Scene",
     "SceneSpec",
     "arm_chain",
+    "axis_of_turn",
     "body_frame_positions",
     "environment_at",
     "environment_names",

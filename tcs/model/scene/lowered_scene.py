@@ -48,7 +48,7 @@ class LoweredScene:
             if array.dtype.kind == "f":
                 # Adding 0.0 turns -0.0 into 0.0, which is equal and must have the same hash.
                 array = np.round(array.astype("<f8"), _DIGEST_DECIMALS) + 0.0
-            else:
+            elif array.dtype != np.uint8:
                 array = array.astype("<i8")
             sha.update(repr(array.shape).encode())
             sha.update(array.tobytes())
@@ -91,8 +91,11 @@ def _flat(item: object) -> Iterator[object]:
     if isinstance(item, Chain) and not np.any(item.slides):
         # Scenes of revolute joints keep the digests that files were written with.
         item = item[:-3] if item.joints == 7 else item[:-2]
-    if isinstance(item, SceneArrays) and not len(item.freedom):
-        item = item[:-1]
+    if isinstance(item, SceneArrays):
+        # So do scenes without free goals, and without tables of distances.
+        freedom = (item.freedom,) if len(item.freedom) else ()
+        distances = (item.distances,) if len(item.distances.cells) else ()
+        item = (*item[:-2], *freedom, *distances)
     if isinstance(item, tuple):
         for member in item:
             yield from _flat(member)

@@ -11,15 +11,24 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.tree import Frame, PrismaticJoint
 
 from tcs.errors import UnknownNameError
-from tcs.kernel.arrays import Chain, FloatArray, GridArrays, SceneArrays, Shapes
-from tcs.kernel.freedom.forms import COLUMNS
+from tcs.kernel.arrays import (
+    NO_DISTANCES,
+    BodyDistances,
+    Chain,
+    FloatArray,
+    GridArrays,
+    SceneArrays,
+    Shapes,
+)
 from tcs.model.grid import Grid
+from tcs.model.robots.distances import tables_in_force
 from tcs.model.scene.attached import AttachedPoses
 from tcs.model.scene.chain import JointAxis, link_frames
 from tcs.model.scene.contacts import ContactRule, Group, Part, shape_of
 from tcs.model.scene.lowered_scene import LoweredScene, read_only
 from tcs.model.scene.plant import coupled_frames, standing_contacts
 from tcs.model.scene.scene import Scene
+from tcs.model.scene.turning import freedom_rows
 from tcs.model.tasks import Task
 
 JOINTS = 7
@@ -39,6 +48,7 @@ def lower(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
             axis, or the task allows contact between bodies that do not exist.
         GridError: If a grid axis exceeds its joint's limits, or has another unit.
         EnvironmentFileError: If the kernel does not support a shape.
+        TaskError: If an arm of five joints lacks the freedom of a goal that it needs.
     """
     before = scene.positions()
     try:
@@ -93,7 +103,8 @@ def _lowered(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
         self_margin=scene.spec.robot.self_margin,
         goal_R=_rotations(goal_matrices),
         goal_p=_origins(goal_matrices),
-        freedom=_freedom(task),
+        freedom=freedom_rows(task, chain, scene.spec.robot.name),
+        distances=_distances(scene, robot_bodies),
     )
     return LoweredScene(
         arrays=read_only(arrays),
@@ -112,12 +123,25 @@ def _lowered(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
     )
 
 
-def _freedom(task: Task | None) -> FloatArray:
-    """Return what is free about each goal of a task, without rows if nothing is."""
-    if task is None or not task.has_freedom:
-        return np.empty((0, COLUMNS))
-    none = np.zeros(COLUMNS)
-    return np.array([none if goal.free is None else goal.free.row() for goal in task.goals])
+def _distances(scene: Scene, bodies: tuple[str, ...]) -> BodyDistances:
+    """Return the tables of distances of the robot's bodies that have shapes.
+
+    Raises:
+        RobotError: If the file of the tables cannot be read.
+    """
+    robot = scene.spec.robot
+    tables = [t for t in tables_in_force(robot) if set(t.pair) <= set(bodies)]
+    if not tables:
+        return NO_DISTANCES
+    number = {name: i for i, name in enumerate(bodies)}
+    joint = {name: JOINTS - len(robot.arm_joints) + i for i, name in enumerate(robot.arm_joints)}
+    return BodyDistances(
+        body=np.array([[number[name] for name in t.pair] for t in tables], np.int64),
+        joint=np.array([[joint[name] for name in t.joints] for t in tables], np.int64),
+        size=np.array([t.cells.shape for t in tables], np.int64),
+        reach=np.array([t.reach for t in tables], np.float64),
+        cells=np.concatenate([t.cells.ravel() for t in tables]),
+    )
 
 
 def arm_chain(scene: Scene) -> tuple[Chain, list[RigidTransform]]:
@@ -134,7 +158,8 @@ def arm_chain(scene: Scene) -> tuple[Chain, list[RigidTransform]]:
         direction = joint.translation_axis() if is_prismatic else joint.revolute_axis()
         axes.append(JointAxis(X_AJ.rotation().matrix(), X_AJ.translation(), direction))
         slides.append((1.0 + len(followers)) if is_prismatic else 0.0)
-    # An arm of six joints has one more before its first, about the same axis, which remains at 0.
+    # An arm of six joints has one more before its first, about the same axis, which remains at 0;
+    # one of five has two.
     fixed = JOINTS - len(axes)
     R_AL, p_AL = link_frames((*axes[:1] * fixed, *axes))
     X_AL = [_transform(R, p) for R, p in zip(R_AL, p_AL, strict=True)]
@@ -262,9 +287,12 @@ def _environment_states(
     of_parts = scene.attached(Group.ENVIRONMENT)
     of_goals = AttachedPoses.of([] if task is None else _goals_in_frames(scene, task))
     shapes, goals = [], []
+    present: dict[str, float] = {}
     for state in states:
         for name, value in state.items():
-            scene.set_joint(name, value)
+            if present.get(name) != value:
+                scene.set_joint(name, value)
+                present[name] = value
         shapes.append(_seen_from_mount(scene, of_parts.frames_in_world(scene.plant_context)))
         goals.append(_seen_from_mount(scene, of_goals.frames_in_world(scene.plant_context)))
     return (

@@ -68,7 +68,11 @@ class NeighbourList:
             pair = query.ComputeSignedDistancePairClosestPoints(a.geometry, b.geometry)
             if pair.distance < self._required[row]:
                 found.append((a, b, pair.distance))
-        return least_distances(found)
+        return tuple(
+            contact
+            for contact in self.scene.by_surfaces(least_distances(found))
+            if contact[2] < self.scene.required_clearance(contact[0], contact[1])
+        )
 
     def _moved(self) -> FloatArray | None:
         """Return how far any point of each body has moved at most since pairs were sought [m].

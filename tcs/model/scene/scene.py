@@ -17,6 +17,7 @@ from tcs.model.scene.attached import AttachedPoses
 from tcs.model.scene.contacts import Group, Part
 from tcs.model.scene.plant import ScenePlant, build_plant
 from tcs.model.scene.spec import SceneSpec
+from tcs.model.scene.surfaces import SurfaceContacts
 
 Contact = tuple[str, str, float]
 """Two bodies and the signed distance between them [m]."""
@@ -70,6 +71,7 @@ class Scene:
         self._part_of = {part.geometry: part for part in self.built.parts}
         self._self_margin = spec.robot.self_margin
         self._contact_margin = spec.environment.contact_margin
+        self._surfaces = SurfaceContacts(spec.robot, self.built.parts, self.built.arm_joints)
         for part in self.built.parts:
             # The shapes of one link share its padding.
             self._pads[part.name] = max(part.pad, self._pads.get(part.name, 0.0))
@@ -244,12 +246,31 @@ class Scene:
         Returns:
             For each pair of bodies the least signed distance between their shapes, negative where
             they overlap. Bodies of the arm come first in a pair, those of the environment last.
+            Where shapes are closer than required and a table of distances shows that the surfaces
+            are not, it is the distance of the surfaces.
         """
         query = self.query_object()
-        return least_distances(
-            (self._part_of[pair.id_A], self._part_of[pair.id_B], pair.distance)
-            for pair in query.ComputeSignedDistancePairwiseClosestPoints(max_distance)
+        return self.by_surfaces(
+            least_distances(
+                (self._part_of[pair.id_A], self._part_of[pair.id_B], pair.distance)
+                for pair in query.ComputeSignedDistancePairwiseClosestPoints(max_distance)
+            )
         )
+
+    def by_surfaces(self, contacts: Iterable[Contact]) -> tuple[Contact, ...]:
+        """Return contacts with distances of surfaces where a table says that they decide.
+
+        Args:
+            contacts: Pairs of bodies with the distances of their shapes at the current state.
+        """
+        plant, found = self.built.plant, []
+        for first, second, apart in contacts:
+            required = self.required_clearance(first, second)
+            distance = None
+            if apart < required:
+                distance = self._surfaces.distance(plant, self._state, first, second, required)
+            found.append((first, second, apart if distance is None else distance))
+        return tuple(sorted(found, key=lambda contact: (contact[2], contact[:2])))
 
     def required_clearance(self, first: str, second: str) -> float:
         """Return the distance that two bodies must keep [m].

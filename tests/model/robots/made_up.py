@@ -1,5 +1,7 @@
 """A small URDF of boxes for tests: base on the floor, torso, seven revolute joints, gripper."""
 
+from itertools import cycle
+
 # Where each arm joint sits in its parent, and about which axis it turns: a roll-pitch-roll arm with
 # a wrist whose last three axes meet.
 ARM = [
@@ -72,3 +74,34 @@ def urdf(joints=7, wrist_offset=0.0):
         joint("grip", "prismatic", parent, "finger", (0, 0.02, 0.145), "0 1 0", limits=(0.0, 0.04)),
     ]
     return f'<robot name="made_up">{"".join(parts)}</robot>'
+
+
+def gantry(kinds="PPPRRR", telescope=True):
+    """Return a URDF of prismatic (P) and revolute (R) joints, its first one with a second stage."""
+    parts = [link("base", ((0.4, 0.4, 0.3), (0, 0, 0.15)))]
+    slides, turns = cycle(("0 0 1", "1 0 0", "0 1 0")), cycle(("0 0 1", "0 1 0", "1 0 0"))
+    parent, first = "base", True
+    for i, kind in enumerate(kinds, start=1):
+        if kind == "P":
+            axis, box = next(slides), ((0.05, 0.05, 0.05), (0, 0, 0.0))
+            moved = joint(f"j{i}", "prismatic", parent, f"l{i}", (0.1, 0, 0.15), axis, (0.0, 0.4))
+        else:
+            axis, box = next(turns), ((0.04, 0.04, 0.04), (0, 0, 0.0))
+            moved = joint(f"j{i}", "revolute", parent, f"l{i}", (0.12, 0, 0), axis, (-1.4, 1.4))
+        parts += [link(f"l{i}", box), moved]
+        parent = f"l{i}"
+        if first and telescope:
+            follower = joint("stage", "prismatic", parent, "stage", (0.1, 0, 0.1), axis, (0.0, 0.4))
+            parts += [
+                link("stage", ((0.04, 0.04, 0.04), (0, 0, 0.0))),
+                follower.replace("</joint>", f'<mimic joint="j{i}"/></joint>'),
+            ]
+            parent = "stage"
+        first = False
+    parts += [
+        link("tool"),
+        joint("tool_joint", "fixed", parent, "tool", (0.12, 0, 0)),
+        link("finger", ((0.06, 0.02, 0.02), (0.03, 0, 0))),
+        joint("grip", "prismatic", parent, "finger", (0.05, 0, 0), "0 1 0", limits=(0.0, 0.04)),
+    ]
+    return f'<robot name="gantry">{"".join(parts)}</robot>'

@@ -161,8 +161,8 @@ WRONG = {
         "field 'arm_joints': unknown joint.*Did you mean 'l_elbow_flex_joint'",
     ),
     "five arm joints": (
-        lambda content: content.update(arm_joints=content["arm_joints"][:5]),
-        r"field 'arm_joints' is .*, but must have at least 6 items",
+        lambda content: content.update(arm_joints=content["arm_joints"][:4]),
+        r"field 'arm_joints' is .*, but must have at least 5 items",
     ),
     "wrong order": (
         lambda content: content["arm_joints"].reverse(),

@@ -106,9 +106,9 @@ def best_candidate(points: FloatArray, orientations: FloatArray) -> Candidate:
 
     Args:
         points: [m], shape (m, 3).
-        orientations: Further orientations to try, shape (k, 3, 3).
+        orientations: Orientations to try, shape (k, 3, 3), the tightest one first.
     """
-    tried = [tightest_orientation(points), *orientations]
+    tried = list(orientations)
     boxes = [Candidate("box", R, _box_volume(points, R)) for R in tried]
     smallest = min(boxes, key=lambda candidate: candidate.volume)
     # A capsule may lie along any axis of a frame.

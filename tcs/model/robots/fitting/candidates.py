@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tcs.model.robots.fitting.bounding import enclose, enclose_axis, tightest_orientation
+from tcs.model.robots.fitting.bounding import enclose, enclose_axis
 from tcs.model.robots.fitting.growth import boxes_in, capsules_in
 from tcs.model.robots.fitting.reduction import contain
 from tcs.model.robots.fitting.solid import Solid
@@ -121,9 +121,12 @@ class Candidates:
         return np.concatenate([whole, contained[corners:]])
 
 
-def orientations(points: FloatArray) -> FloatArray:
-    """Return axes to try: those of the body, of its smallest box, and rotated ones."""
-    tight = tightest_orientation(points)
+def orientations(tight: FloatArray) -> FloatArray:
+    """Return axes to try: those of the body, of its smallest box, and rotated ones.
+
+    Args:
+        tight: Those of its smallest box, shape (3, 3).
+    """
     return np.concatenate([turned(np.eye(3), range(0, 90, 15)), turned(tight, (0, 30, 60))])
 
 

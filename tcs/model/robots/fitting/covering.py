@@ -18,6 +18,7 @@ from tcs.model.robots.fitting.bounding import (
     enclose,
     hull_corners,
     hull_volume,
+    tightest_orientation,
 )
 from tcs.model.robots.fitting.candidates import (
     Candidates,
@@ -99,11 +100,12 @@ def fit_triangles(body: str, triangles: FloatArray, target: Target) -> Fit:
     """
     corners = np.unique(triangles.reshape(-1, 3), axis=0)
     points, hull = hull_corners(corners), hull_volume(triangles)
-    single = best_candidate(points, np.eye(3)[None])
+    tight = tightest_orientation(points)
+    single = best_candidate(points, np.stack([tight, np.eye(3)]))
     shapes = [enclose(body, points, single.kind, single.R)]
     if _mean_protrusion(points, single.volume - hull) > _SLACK * target.protrusion:
         # Without any, a long, thin part has nothing inside that is as wide as the voxels.
-        shapes = _covering(body, triangles, points, target) or shapes
+        shapes = _covering(body, triangles, points, tight, target) or shapes
     shapes += fillers(body, tuple(shapes), triangles)
     return Fit(primitives=tuple(shapes), hull=hull, union=union_volume(shapes))
 
@@ -117,9 +119,9 @@ def _mean_protrusion(points: FloatArray, excess: float) -> float:
 
 
 def _covering(
-    body: str, triangles: FloatArray, points: FloatArray, target: Target
+    body: str, triangles: FloatArray, points: FloatArray, tight: FloatArray, target: Target
 ) -> list[Primitive]:
-    """Return shapes that cover a surface with the given corners of its hull; maybe none."""
+    """Return shapes that cover a surface, given its hull's corners and tightest box; maybe none."""
     rng = np.random.default_rng(SEED)
     size = float(np.ptp(points, axis=0).max())
     pitch = max(target.protrusion / PER_PROTRUSION, size / ACROSS)
@@ -127,7 +129,7 @@ def _covering(
     pieces = cut(triangles, max(PIECE, 2 * pitch))
     inside = solid.points(solid.depth > max(DEEP, 4 * pitch))
     inside = thinned(inside, max(DEEP, size / SPACINGS))
-    some, tried = sample(pieces, max(PIECE, 2 * pitch), rng), orientations(points)
+    some, tried = sample(pieces, max(PIECE, 2 * pitch), rng), orientations(tight)
     candidates = Candidates(body, solid, target.protrusion, tried, some, inside, rng)
     shapes = candidates.chosen(target.max_shapes)
     if target.patches:

@@ -62,9 +62,11 @@ def reduced(
         away = np.stack([shape.distance(pieces[bare]).max(axis=1) for shape in shapes])
         within[away.argmin(axis=0), bare] = True
     current: dict[int, Primitive] = dict(enumerate(shapes))
+    count = within.sum(axis=0)
     # The smallest first, so that they are dropped rather than large ones reduced.
     for k in sorted(current, key=lambda k: shapes[k].volume):
-        alone = within[k] & ~within[[j for j in current if j != k]].any(axis=0)
+        alone = within[k] & (count == 1)
+        count -= within[k]
         points = np.concatenate(
             [pieces[alone[: len(pieces)]].reshape(-1, 3), inside[alone[len(pieces) :]]]
         )
@@ -76,6 +78,7 @@ def reduced(
             box = enclose(body, np.unique(points, axis=0), "box", shapes[k].rotation)
             current[k] = min(current[k], box, key=lambda shape: shape.volume)
         within[k] = holds(current[k])
+        count += within[k]
     return list(current.values())
 
 

@@ -6,6 +6,9 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
+from tcs.model.robots.distances import DistanceTable, tables_in_force
 from tcs.model.robots.extras import model_with_extras
 from tcs.model.robots.robot_file import RobotFile
 from tcs.model.robots.self_collision.clearance import (
@@ -40,6 +43,19 @@ class Blocked:
         """Fraction of the free postures that shapes block, 0 without free postures."""
         return self.blocked / self.free if self.free else 0.0
 
+    def worst(self, allowed: float) -> tuple[BodyPair, ...]:
+        """Return the pairs that block most, as many as leave the others a fraction of postures.
+
+        Args:
+            allowed: Greatest fraction of the free postures that the others block together.
+        """
+        left = np.cumsum([count for _, count in self.pairs][::-1])[::-1]
+        return tuple(
+            pair
+            for (pair, _), rest in zip(self.pairs, left, strict=True)
+            if rest > allowed * self.free
+        )
+
     def text(self) -> str:
         """Return the figures in one line, with the three worst pairs."""
         worst = "; ".join(
@@ -58,7 +74,8 @@ def blocked_by_shapes(robot: RobotFile, *, postures: int = 300, seed: int = 0) -
 
     Arm and torso are drawn within the joint limits, everything else keeps its posture. Shapes
     enclose the surfaces, so only pairs whose shapes touch need the distance of the surfaces, which
-    are sampled as points: a distance below their spacing counts as contact. Postures outside the
+    are sampled as points: a distance below their spacing counts as contact. Pairs that a table of
+    distances shows to be apart do not touch. Postures outside the
     ranges of disabled groups are drawn too, and count as blocked if their surfaces are free.
 
     Args:
@@ -77,18 +94,29 @@ def blocked_by_shapes(robot: RobotFile, *, postures: int = 300, seed: int = 0) -
     plant = SelfCollision(robot)
     plant.ignore_unscored(model, robot.arm_joints)
     plant.ignore(pair for pair in robot.disabled_pairs if frozenset(pair) not in narrowed)
+    tables = {frozenset(table.pair): table for table in tables_in_force(robot)}
     free = blocked = 0
     pairs = Counter[BodyPair]()
     for positions in drawn_positions(robot, postures, seed):
         is_within = all(limits[n][0] <= positions[n] <= limits[n][1] for n in robot.arm_joints)
         exempt = off if is_within else off - narrowed
-        touching = [p for p in plant.touching(positions) if frozenset(p) not in exempt]
+        touching = [
+            pair
+            for pair in plant.touching(positions)
+            if frozenset(pair) not in exempt
+            and not _are_apart(tables.get(frozenset(pair)), positions, robot.self_margin)
+        ]
         if any(surfaces.distance(pair, positions) < SPACING for pair in touching):
             continue
         free += 1
         blocked += bool(touching) or not is_within
         pairs.update(touching)
     return Blocked(free, blocked, ranked(pairs))
+
+
+def _are_apart(table: DistanceTable | None, positions: Mapping[str, float], margin: float) -> bool:
+    """Return whether a table shows that two surfaces keep a margin [m]."""
+    return table is not None and table.bound(positions) >= margin
 
 
 def drawn_positions(robot: RobotFile, postures: int, seed: int) -> Iterator[Mapping[str, float]]:

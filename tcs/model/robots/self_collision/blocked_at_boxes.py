@@ -73,12 +73,18 @@ def blocked_at_boxes(robot: RobotFile, *, postures: int = 300, seed: int = 0) ->
     rng = np.random.default_rng(seed)
     free = blocked = 0
     pairs = Counter[BodyPair]()
+    faces: dict[str, FloatArray] = {}
     for poses, start in zip(drawn, starts, strict=True):
         found = set[str]()
         for _ in range(_BOXES):
             box = _random_box(rng, start, reach)
             struck = {body for body in shapes if _touch(shapes[body], poses[body], box)}
-            if any(_surface_touches(surfaces.points(body), poses[body], box) for body in struck):
+            for body in struck - faces.keys():
+                faces[body] = _hull_faces(surfaces.points(body))
+            if any(
+                _surface_touches(surfaces.points(body), faces[body], poses[body], box)
+                for body in struck
+            ):
                 break
             found |= struck
         else:
@@ -134,11 +140,23 @@ def _touch(shapes: FloatArray, pose: Pose, box: FloatArray) -> bool:
     return any(closer(rows, i, box[None], 0, _MARGIN) for i in range(len(rows)))
 
 
-def _surface_touches(points: FloatArray, pose: Pose, box: FloatArray) -> bool:
+def _hull_faces(points: FloatArray) -> FloatArray:
+    """Return the faces of the convex hull of points, normal and offset, shape (n, 4).
+
+    A flat hull has a single face that contains no point.
+    """
+    try:
+        return np.asarray(ConvexHull(points).equations)
+    except QhullError:
+        return np.array([[0.0, 0.0, 0.0, 1.0]])
+
+
+def _surface_touches(points: FloatArray, faces: FloatArray, pose: Pose, box: FloatArray) -> bool:
     """Return whether points of a surface at a pose are close to a box, or enclose its centre.
 
     Args:
         points: Points of the surface of a body in its frame [m], shape (n, 3).
+        faces: Faces of their convex hull, shape (m, 4).
         pose: Pose of the body.
         box: Packed, shape (17,).
     """
@@ -148,8 +166,4 @@ def _surface_touches(points: FloatArray, pose: Pose, box: FloatArray) -> bool:
     away = np.linalg.norm(np.maximum(np.abs(seen) - box[SIZE : SIZE + 3], 0.0), axis=1)
     if away.min() < SPACING:
         return True
-    try:
-        faces = ConvexHull(points).equations
-    except QhullError:
-        return False
     return bool(np.all(faces[:, :3] @ (R.T @ (centre - p)) + faces[:, 3] <= 0.0))

@@ -12,6 +12,11 @@ from scipy.spatial import cKDTree
 from tcs.model.robots.fitting.enclosure import surfaces_to_enclose
 from tcs.model.robots.robot_file import RobotFile
 from tcs.model.robots.self_collision.plant import BodyPair
+from tcs.model.robots.self_collision.point_blocks import (
+    PointBlocks,
+    blocks_of,
+    least_distance,
+)
 from tcs.model.robots.urdf import Joint, Urdf
 from tcs.model.robots.urdf.pose import pose_in_root
 from tcs.model.robots.urdf.surfaces import body_triangles, welded_top
@@ -65,6 +70,7 @@ class SurfaceDistance:
         self._triangles = triangles
         self._points: dict[str, FloatArray] = {}
         self._trees: dict[str, cKDTree] = {}
+        self._blocks: dict[str, PointBlocks] = {}
 
     def has(self, body: str) -> bool:
         """Return whether a body has a surface."""
@@ -131,17 +137,15 @@ class SurfaceDistance:
                 return rough
             # A finer point has a rough point of its surface within the usual spacing.
             far = rough + SPACING
-        # The body with more points goes into the tree; each point of the other is one query.
+        # The body with more points goes into the tree, those of the other are queries.
         many, few = sorted(pair, key=lambda body: -len(self.points(body)))
         if many not in self._trees:
             self._trees[many] = cKDTree(self.points(many))
         tree = self._trees[many]
         R_AB, p_AB = _relative_pose(self._model, (many, few), positions)
-        points = self.points(few) @ R_AB.T + p_AB
-        # Queries of far points are the slowest, and do not change the result.
-        points = points[((points > tree.mins - far) & (points < tree.maxes + far)).all(axis=1)]
-        near, _ = tree.query(points, distance_upper_bound=far)
-        return min(float(near.min(initial=far)), far)
+        if few not in self._blocks:
+            self._blocks[few] = blocks_of(self.points(few))
+        return least_distance(tree, self._blocks[few], R_AB, p_AB, far)
 
     def points(self, body: str) -> FloatArray:
         """Return points on the surface of a body, corners included, in its frame [m], (n, 3)."""

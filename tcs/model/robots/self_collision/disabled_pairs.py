@@ -66,6 +66,7 @@ def propose_disabled_pairs(
     triangles = carried_triangles(robot, model)
     surfaces = SurfaceDistance(model, triangles)
     fine = SurfaceDistance(model, triangles, scale=FINER, rough=surfaces)
+    hard_limits, soft_limits = hard.joint_limits(), soft.joint_limits()
     found = _Found()
     for pair in sorted(touched):
         if not all(surfaces.has(body) for body in pair):
@@ -76,8 +77,12 @@ def propose_disabled_pairs(
         if set(pair) <= hand:
             # Scoring does not check pairs within the hand.
             continue
-        few = len(free_joints(model, joints_between(model, *pair))) <= _MOST_JOINTS
-        for limits, apart in ((hard, found.apart_hard), (soft, found.apart_soft)):
+        between = free_joints(model, joints_between(model, *pair))
+        few = len(between) <= _MOST_JOINTS
+        tried = [(hard, found.apart_hard), (soft, found.apart_soft)]
+        if all(hard_limits[name] == soft_limits[name] for name in between):
+            tried.pop()
+        for limits, apart in tried:
             gap = _closest_approach((surfaces, fine), pair, limits, seed) if few else 0.0
             if gap >= MEETING:
                 apart[pair] = gap

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import os
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from tcs.files.paths import CACHE_ADVICE, cache_folder
 from tcs.files.quantities import SIZE
 from tcs.files.reading import read_bytes
 from tcs.files.writing import whole_file
+from tcs.model.robots.urdf.collada import geometry_only
 
 if TYPE_CHECKING:
     import trimesh
@@ -29,7 +31,7 @@ MAX_TRIANGLES = 5_000_000
 MAX_COORDINATE = SIZE.high * 1e4
 """Greatest coordinate in the unit of a mesh: the greatest size in tenths of a millimetre."""
 
-_VERSION = b"1"
+_VERSION = b"2"
 """Part of the cache key: increase it when the conversion changes."""
 
 
@@ -87,9 +89,15 @@ def _load(mesh: Path) -> trimesh.Trimesh:
     # A late import: it takes half a second, and scoring does not need it.
     import trimesh
 
-    _content(mesh)
+    content = _content(mesh)
+    file: Path | io.BytesIO = mesh
+    options: dict[str, Any] = {}
     try:
-        loaded = trimesh.load(mesh, force="mesh", process=False)
+        if mesh.suffix.lower() == ".dae":
+            # Faults of geometry are raised, not passed over with what they concern.
+            file = io.BytesIO(geometry_only(content))
+            options = {"file_type": "dae", "ignore_broken": False}
+        loaded = trimesh.load(file, force="mesh", process=False, **options)
     except MemoryError:
         raise
     except Exception as error:  # its readers raise errors of many classes

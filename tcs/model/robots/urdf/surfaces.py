@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -71,6 +70,9 @@ def geometry_triangles(geometry: Geometry) -> FloatArray:
                 f"{SIZE.high:g} m. Give it the scale of its unit, e.g. 0.001 for millimetres."
             )
         return triangles
+    # Its import takes long, and scenes of robots that ship are built without it.
+    import trimesh
+
     if geometry.shape == "box":
         solid = trimesh.creation.box(geometry.size)
     elif geometry.shape == "cylinder":

@@ -49,7 +49,7 @@ def test_a_rotated_box_is_fitted_by_an_equal_box(seed):
 def test_capsule_gets_a_capsule():
     solid = trimesh.creation.capsule(height=0.3, radius=0.05, count=[32, 32])
     points = corner_points(triangles_of(solid))
-    candidate = best_candidate(points, np.eye(3)[None])
+    candidate = best_candidate(points, np.stack([tightest_orientation(points), np.eye(3)]))
     assert candidate.kind == "capsule"
     shape = enclose("b", points, candidate.kind, candidate.R)
     assert shape.contains(points).all()

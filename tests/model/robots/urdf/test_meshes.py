@@ -86,3 +86,60 @@ def test_an_obj_of_vertices_with_two_coordinates_is_refused(tmp_path):
     flat.write_text("v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n")
     with pytest.raises(RobotError, match="a vertex has not three coordinates"):
         mesh_triangles(flat)
+
+
+def collada(material="paint"):
+    """Return a Collada file of a triangle of one material, and of another one of none."""
+    corners = '<float_array id="f{0}" count="9">{0} 0 0 {0} 1 0 {0} 0 1</float_array>'
+    geometry = (
+        '<geometry id="g{0}"><mesh><source id="s{0}">'
+        + corners
+        + '<technique_common><accessor source="#f{0}" count="3" stride="3">'
+        + "".join(f'<param name="{axis}" type="float"/>' for axis in "XYZ")
+        + '</accessor></technique_common></source><vertices id="v{0}">'
+        '<input semantic="POSITION" source="#s{0}"/></vertices><triangles count="1"{1}>'
+        '<input semantic="VERTEX" source="#v{0}" offset="0"/><p>0 1 2</p></triangles></mesh>'
+        "</geometry>"
+    )
+    bound = (
+        '<bind_material><technique_common><instance_material symbol="skin" '
+        f'target="#{material}"/></technique_common></bind_material>'
+    )
+    nodes = "".join(
+        f'<node id="n{i}"><instance_geometry url="#g{i}">{text}</instance_geometry></node>'
+        for i, text in ((1, bound), (2, ""))
+    )
+    return (
+        '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">'
+        "<asset><created>2020-01-01T00:00:00</created><modified>2020-01-01T00:00:00</modified>"
+        "</asset><library_geometries>"
+        + geometry.format(1, ' material="skin"')
+        + geometry.format(2, "")
+        + f'</library_geometries><library_visual_scenes><visual_scene id="all">{nodes}'
+        '</visual_scene></library_visual_scenes><scene><instance_visual_scene url="#all"/></scene>'
+        "</COLLADA>"
+    )
+
+
+def test_geometry_whose_material_is_missing_is_read(tmp_path):
+    """Before, it was left out: a part of the surface, without a word."""
+    path = tmp_path / "part.dae"
+    path.write_text(collada(material="not there"))
+    assert sorted(mesh_triangles(path)[:, 0, 0]) == [1.0, 2.0]
+    assert as_obj(path).read_text().count("\nf ") == 2
+
+
+def test_geometry_that_a_collada_file_names_but_lacks_is_refused(tmp_path):
+    path = tmp_path / "part.dae"
+    path.write_text(collada().replace('url="#g1"', 'url="#gone"'))
+    with pytest.raises(RobotError, match=r"part\.dae' cannot be used: .*gone"):
+        mesh_triangles(path)
+
+
+@pytest.mark.parametrize("text", ["", "no XML", "<COLLADA/>"])
+def test_a_collada_file_that_is_none_is_refused(tmp_path, text):
+    path = tmp_path / "part.dae"
+    path.write_text(text)
+    with pytest.raises(RobotError, match=r"part\.dae'") as caught:
+        mesh_triangles(path)
+    assert "\n" not in str(caught.value)

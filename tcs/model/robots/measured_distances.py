@@ -1,0 +1,256 @@
+"""Tables of distances of a robot, measured on its meshes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Iterator, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.model.robots.distances.sources import source_digest
+from tcs.model.robots.distances.table import UNIT, DistanceTable
+from tcs.model.robots.extras import model_with_extras
+from tcs.model.robots.robot_file import RobotFile
+from tcs.model.robots.self_collision.clearance import carried_triangles, joints_between
+from tcs.model.robots.self_collision.plant import BodyPair, SelfCollision
+from tcs.model.robots.self_collision.postures import sample_positions
+from tcs.model.robots.surface_pair import SurfacePair
+
+FloatArray = NDArray[np.float64]
+Joints = tuple[str, str]
+"""Two joints of an arm, the one nearer to the base first; the same one twice if it is alone."""
+
+LOSSES = (0.00025, 0.0015)
+"""Least and greatest decrease of the bound from the centre of a cell to its edge, for either joint
+[m]."""
+LOST = 3e-4
+"""Share of postures that a table may block although the surfaces are free, which decides between
+these."""
+_NEAR = 0.003
+"""Distance beyond the margin up to which free postures are counted for that [m]."""
+MOST = 1 << 22
+"""Greatest number of cells of a table, up to whole blocks."""
+TOUCHING = 0.005
+"""Gap up to which shapes count as touching [m]: a margin of the robot file may be as wide."""
+ENOUGH = 0.003
+"""Distance [m] all over a block of cells above which its cells are not measured one by one."""
+LEAST_SHARE = 5e-4
+"""Least share of postures that a pair blocks by its shapes alone for which it gets a table."""
+BLOCKS = (64, 16, 4, 1)
+"""Cells along the edges of the blocks that are measured, coarse blocks first."""
+ROUNDING = 1e-6
+"""Subtracted from measured distances [m], above rounding errors."""
+
+
+def measured_tables(
+    robot: RobotFile,
+    *,
+    postures: int = 4000,
+    seed: int = 0,
+    only: Collection[frozenset[str]] | None = None,
+    on_pair: Callable[[BodyPair, float], None] = lambda pair, share: None,
+) -> tuple[DistanceTable, ...]:
+    """Return tables of the pairs of bodies whose shapes block postures that their surfaces do not.
+
+    Only pairs of `table_pairs` are looked at. With three joints between them, one body counts as
+    all that it sweeps as the joint next to it turns: that costs little where it is round.
+
+    Args:
+        robot: The robot.
+        postures: Random postures that decide which pairs get a table.
+        seed: Seed of the draws.
+        only: Pairs to look at, all if left out.
+        on_pair: Called with each pair that gets a table before it is measured, and the share of
+            postures that its shapes block alone.
+
+    Raises:
+        RobotError: If a mesh cannot be read, or the package `coal` is missing.
+    """
+    carried = carried_triangles(robot, model_with_extras(robot))
+    surfaces = {
+        pair: [SurfacePair.of(robot, pair, carried, joints) for joints in choices]
+        for pair, choices in table_pairs(robot).items()
+        if set(pair) <= carried.keys() and (only is None or frozenset(pair) in only)
+    }
+    tables = []
+    for surface, free in _blocking(robot, surfaces, postures, seed):
+        share = len(free) / postures
+        if share >= LEAST_SHARE:
+            on_pair(surface.pair, share)
+            near = np.count_nonzero(free < robot.self_margin + _NEAR) / postures
+            loss = float(np.clip(LOST * _NEAR / max(near, 1.0 / postures), *LOSSES))
+            tables.append(measured_table(surface, robot, loss))
+    return tuple(tables)
+
+
+def table_pairs(robot: RobotFile) -> Mapping[BodyPair, tuple[Joints, ...]]:
+    """Return the checked pairs of bodies with up to three revolute joints of the arm between them.
+
+    Returns:
+        By pair, the body nearer to the base first: the joints over which a table can be, of three
+        without the first, or without the last.
+    """
+    model = model_with_extras(robot)
+    bodies = sorted({shape.body for shape in robot.load_primitives()})
+    off = {frozenset(pair) for pair in robot.disabled_pairs}
+    order = {name: n for n, name in enumerate(robot.arm_joints)}
+    hand = model.links_moved_by(robot.arm_joints[-1])
+    found: dict[BodyPair, tuple[Joints, ...]] = {}
+    for second in bodies:
+        for first in bodies:
+            joints = joints_between(model, first, second)
+            if not (
+                1 <= len(joints) <= 3
+                and all(joint.name in order for joint in joints)
+                and all(joint.type in ("revolute", "continuous") for joint in joints)
+                and frozenset((first, second)) not in off
+                and not {first, second} <= hand
+            ):
+                continue
+            names = sorted((joint.name for joint in joints), key=order.__getitem__)
+            if second in model.links_moved_by(names[0]):
+                parts = names[:2], names[-2:]
+                found[first, second] = tuple(dict.fromkeys((part[0], part[-1]) for part in parts))
+    return found
+
+
+def _blocking(
+    robot: RobotFile,
+    surfaces: Mapping[BodyPair, list[SurfacePair]],
+    postures: int,
+    seed: int,
+) -> Iterator[tuple[SurfacePair, FloatArray]]:
+    """Yield the distances of each pair's surfaces where they are free and its shapes are not [m].
+
+    Of several choices of joints, those of the choice that shows most of the postures to be free.
+    """
+    plant = SelfCollision(robot)
+    plant.ignore_unscored(model_with_extras(robot), robot.arm_joints)
+    of_names = {frozenset(pair): pair for pair in surfaces}
+    every = sorted(plant.bodies)
+    plant.ignore(
+        (a, b) for a in every for b in every if a < b and frozenset((a, b)) not in of_names
+    )
+    found: dict[BodyPair, list[list[float]]] = {
+        pair: [[] for _ in choices] for pair, choices in surfaces.items()
+    }
+    for positions in sample_positions(robot, postures, seed):
+        for names in plant.touching(positions):
+            pair = of_names[frozenset(names)]
+            for surface, distances in zip(surfaces[pair], found[pair], strict=True):
+                distance = surface.distance(*(positions[name] for name in surface.joints))
+                if distance >= robot.self_margin:
+                    distances.append(distance)
+    for pair, choices in surfaces.items():
+        best = int(np.argmax([len(distances) for distances in found[pair]]))
+        yield choices[best], np.array(found[pair][best])
+
+
+def measured_table(surfaces: SurfacePair, robot: RobotFile, loss: float) -> DistanceTable:
+    """Return the table, measured where a joint can be within its hard limits.
+
+    Args:
+        surfaces: The surfaces.
+        robot: The robot.
+        loss: Decrease of the bound from the centre of a cell to its edge, for either joint [m];
+            more if the table would have more than `MOST` cells.
+    """
+    reach = surfaces.reach()
+    limits = robot.with_choices(limits="hard").without_ranges.joint_limits()
+    wide = max(loss, math.pi * math.sqrt(reach[0] * reach[1] / MOST))
+    blocks = [max(1, math.ceil(math.pi * r / (wide * BLOCKS[0]))) for r in reach]
+    if surfaces.is_of_one_joint:
+        count = (blocks[0] * BLOCKS[0], 1)
+    else:
+        count = (blocks[0] * BLOCKS[0], blocks[1] * BLOCKS[0])
+    steps = (2.0 * math.pi / count[0], 2.0 * math.pi / count[1])
+    allowed = [
+        _reachable(n, step, limits[name])
+        for n, step, name in zip(count, steps, surfaces.joints, strict=True)
+    ]
+    if surfaces.is_of_one_joint:
+        allowed[1] = np.ones(1, np.bool_)
+    cells = np.zeros(count, np.uint8)
+    wanted = np.ones([math.ceil(n / BLOCKS[0]) for n in count], np.bool_)
+    for level, edge in enumerate(BLOCKS):
+        wanted = _measure(surfaces, cells, wanted, edge, steps, reach, allowed)
+        if level + 1 < len(BLOCKS):
+            finer = edge // BLOCKS[level + 1]
+            wanted = wanted.repeat(finer, axis=0)
+            wanted = wanted if surfaces.is_of_one_joint else wanted.repeat(finer, axis=1)
+    return DistanceTable(
+        pair=surfaces.pair,
+        joints=surfaces.joints,
+        reach=reach,
+        cells=cells,
+        source=source_digest(robot, surfaces.pair),
+    )
+
+
+def _measure(
+    surfaces: SurfacePair,
+    cells: NDArray[np.uint8],
+    wanted: NDArray[np.bool_],
+    edge: int,
+    steps: tuple[float, float],
+    reach: tuple[float, float],
+    allowed: list[NDArray[np.bool_]],
+) -> NDArray[np.bool_]:
+    """Measure blocks of cells at their centres; fill the cells of those that are far apart.
+
+    Args:
+        surfaces: The surfaces.
+        cells: Filled, as in `DistanceTable`.
+        wanted: Which blocks to measure.
+        edge: Cells along the edges of a block.
+        steps: Edges of a cell [rad].
+        reach: From `reach`.
+        allowed: Whether the joints can be in each cell.
+
+    Returns:
+        The blocks whose parts have to be measured.
+    """
+    edges = (edge, 1 if surfaces.is_of_one_joint else edge)
+    found = np.full(wanted.shape, np.inf)
+    off = [
+        r * step * np.abs(np.arange(n) + 0.5 - 0.5 * n)
+        for r, step, n in zip(reach, steps, edges, strict=True)
+    ]
+    lost = off[0][:, None] + off[1]
+    # At the far edges of the block.
+    slack = sum(0.5 * r * step * n for r, step, n in zip(reach, steps, edges, strict=True))
+    for i, j in np.argwhere(wanted):
+        rows = slice(i * edges[0], (i + 1) * edges[0])
+        columns = slice(j * edges[1], (j + 1) * edges[1])
+        if not (allowed[0][rows].any() and allowed[1][columns].any()):
+            wanted[i, j] = False
+            continue
+        middle = (i + 0.5) * edges[0] * steps[0], (j + 0.5) * edges[1] * steps[1]
+        touching = surfaces.shapes_touch(*middle, TOUCHING + slack)
+        if edge == 1 and not touching:
+            continue
+        found[i, j] = max(0.0, surfaces.distance(*middle) - ROUNDING)
+        # Where shapes are apart, they decide.
+        if edge == 1 or not touching or found[i, j] - lost.max() >= ENOUGH:
+            units = np.floor(np.maximum(found[i, j] - lost, 0.0) / UNIT)
+            cells[rows, columns] = np.minimum(units, 255.0).astype(np.uint8)
+            wanted[i, j] = False
+    if edge == 1:
+        return wanted
+    # Where all blocks around one are in contact too, nothing in it is free, up to slivers.
+    meets = found == 0.0
+    for axis in (0, 1):
+        meets = meets & np.roll(meets, 1, axis) & np.roll(meets, -1, axis)
+    return np.asarray(wanted & ~meets)
+
+
+def _reachable(count: int, step: float, limits: tuple[float, float]) -> NDArray[np.bool_]:
+    """Return which cells of a full turn hold angles within limits [rad]."""
+    low, high = limits
+    if not high - low < 2.0 * math.pi:
+        return np.ones(count, dtype=np.bool_)
+    begin = np.arange(count) * step
+    # The next angle at or above the lower limit that is in the cell.
+    ahead = np.mod(low - begin, 2.0 * math.pi)
+    return np.asarray((ahead < step) | (np.mod(begin - low, 2.0 * math.pi) <= high - low))

@@ -1,0 +1,116 @@
+"""The freedom that the goals of an arm of five joints need, and its axis."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.errors import ArmClassError, TaskError
+from tcs.kernel.arrays import Chain
+from tcs.kernel.five_joints.turned import turned_arm
+from tcs.kernel.freedom.forms import COLUMNS
+from tcs.kernel.kinematics import jacobian, tool_pose
+from tcs.kernel.problem import with_slides
+from tcs.model.tasks import Task
+from tcs.model.tasks.freedom import Vector, axis_name
+
+PARALLEL = 1e-9
+"""Sine of the angle between axes that are the same but for rounding."""
+CHOICES: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+"""Axes of which one is taken where any orientation serves at every goal."""
+POSTURES = 50
+"""Number of random postures at which they are compared."""
+
+
+def freedom_rows(task: Task | None, chain: Chain, robot: str) -> NDArray[np.float64]:
+    """Return what is free about each goal of a task, as the kernel reads it.
+
+    Args:
+        task: The task, None for none.
+        chain: The arm.
+        robot: Name of the robot, for messages.
+
+    Returns:
+        Shape (goals, COLUMNS), without rows if nothing is free. With an arm of five joints, goals
+        with any orientation name the axis that the others leave free.
+
+    Raises:
+        TaskError: If an arm of five joints lacks the freedom that it needs.
+    """
+    if task is None:
+        return np.empty((0, COLUMNS))
+    turn = axis_of_turn(task, chain, robot)
+    if turn is None and not task.has_freedom:
+        return np.empty((0, COLUMNS))
+    rows = np.zeros((len(task.goals), COLUMNS))
+    for row, goal in zip(rows, task.goals, strict=True):
+        if goal.free is not None:
+            row[:] = goal.free.row()
+        if turn is not None:
+            row[:3] = turn
+    return rows
+
+
+def axis_of_turn(task: Task, chain: Chain, robot: str) -> Vector | None:
+    """Return the axis about which all goals leave the tool free, for an arm of five joints.
+
+    Args:
+        task: The task.
+        chain: The arm.
+        robot: Name of the robot, for messages.
+
+    Returns:
+        A unit vector in the tool frame; None for an arm of more joints.
+
+    Raises:
+        TaskError: If a goal leaves no rotation free, goals name different axes, or the rotation
+            adds nothing to what the joints can do.
+    """
+    if chain.joints != 5:
+        return None
+    named: dict[int, Vector] = {}
+    for i, goal in enumerate(task.goals):
+        free = goal.free
+        if free is None or not free.rotates:
+            raise TaskError(
+                f"task '{task.name}', goal {i}: the arm of robot '{robot}' has five joints and "
+                "cannot take every tool pose, so the goal must leave a rotation of the tool free. "
+                "Add 'free: {rotation_about: [x, y, z]}' or 'free: orientation' to the goal."
+            )
+        if not free.is_any_orientation:
+            named[i] = free.axis
+    first = next(iter(named), None)
+    for i, axis in named.items():
+        if first is not None and np.linalg.norm(np.cross(axis, named[first])) > PARALLEL:
+            raise TaskError(
+                f"task '{task.name}': goal {first} leaves the rotation about "
+                f"{axis_name(named[first])} free and goal {i} that about {axis_name(axis)}, but an "
+                f"arm of five joints, as of robot '{robot}', needs the same axis at all goals. "
+                "Score them as two tasks."
+            )
+    axis = _least_like_a_joint(chain) if first is None else named[first]
+    try:
+        turned_arm(chain, np.array(axis))
+    except ArmClassError as error:
+        raise TaskError(
+            f"task '{task.name}', robot '{robot}': about {axis_name(axis)}, {error}"
+        ) from None
+    return axis
+
+
+def _least_like_a_joint(chain: Chain) -> Vector:
+    """Return the axis about which a rotation adds most to what the joints of an arm can do."""
+    rng = np.random.default_rng(0)
+    lower, upper = np.maximum(chain.lower, -np.pi), np.minimum(chain.upper, np.pi)
+    postures = rng.uniform(lower, upper, (POSTURES, 7)) * (np.arange(7) > 1)
+    volumes = np.zeros((POSTURES, len(CHOICES)))
+    R_chain, p_chain = np.array(chain.R, order="C"), with_slides(chain)
+    J, link_R, link_p = np.empty((6, 7)), np.empty((8, 3, 3)), np.empty((8, 3))
+    R, p = np.empty((3, 3)), np.empty(3)
+    for n, q in enumerate(postures):
+        jacobian(R_chain, p_chain, q, J)
+        tool_pose(R_chain, p_chain, q, link_R, link_p, R, p)
+        for k, axis in enumerate(CHOICES):
+            J[:, 1] = [*(R @ axis), 0.0, 0.0, 0.0]
+            volumes[n, k] = abs(np.linalg.det(J[:, 1:]))
+    return CHOICES[int(np.argmax(np.median(volumes, axis=0)))]
