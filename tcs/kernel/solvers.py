@@ -1,10 +1,10 @@
 """Reach test and pair scorer of the sweep, for every solver of the inverse kinematics.
 
 A solver is a named tuple of constants and scratch memory: `analytic.search.Search` for an arm of
-seven joints with a closed form, `numeric.search.NumericSolver` for one without, and
-`six_joints.pairs.SixJointSolver` for an arm of six joints. `out_of_reach` and `score_pair` select
-the implementation by the type of the solver when numba compiles their caller, so a sweep compiles
-the code of its own solver only.
+seven joints with a closed form, `numeric.search.NumericSolver` for one without,
+`six_joints.pairs.SixJointSolver` for an arm of six joints and `five_joints.pairs.FiveJointSolver`
+for one of five. `out_of_reach`, `score_pair` and others select the implementation by the type of
+the solver when numba compiles their caller, so a sweep compiles the code of its own solver only.
 """
 
 from __future__ import annotations
@@ -18,23 +18,34 @@ from tcs.kernel.analytic import pairs as analytic
 from tcs.kernel.analytic.scratch import Search, new_search
 from tcs.kernel.analytic.solver import is_outside
 from tcs.kernel.arrays import FloatArray
-from tcs.kernel.contacts import Workspace
+from tcs.kernel.base_pose import pose_in_arm_base
+from tcs.kernel.cache import inner
+from tcs.kernel.contacts import NO_CONTACT, Workspace, gripper_body_contact
+from tcs.kernel.five_joints import pairs as five_joints
+from tcs.kernel.five_joints.pairs import FiveJointSolver, new_five_joint_solver
 from tcs.kernel.numeric import pairs as numeric
 from tcs.kernel.numeric.search import NumericSolver, new_numeric_solver
 from tcs.kernel.problem import Problem
+from tcs.kernel.scores import GRIPPER_BLOCKED_BY_ROBOT, REACHED, TOO_FAR
 from tcs.kernel.six_joints import pairs as six_joints
 from tcs.kernel.six_joints.pairs import SixJointSolver, new_six_joint_solver
 from tcs.kernel.views import tuple_class
 
-Solver = Search | NumericSolver | SixJointSolver
+Solver = Search | NumericSolver | SixJointSolver | FiveJointSolver
+
+THOROUGH = -2.0
+"""Bound of `score_pose` that leaves nothing to a quick look."""
 
 
 def new_solver(problem: Problem) -> Solver:
     """Return the solver of a problem's arm, with scratch memory for one worker.
 
     Raises:
-        ArmClassError: If the arm has six joints and no closed form.
+        ArmClassError: If an arm of six joints cannot be solved, or one of five for goals that leave
+            what they leave free.
     """
+    if problem.joints == 5:
+        return new_five_joint_solver(problem)
     if problem.joints == 6:
         return new_six_joint_solver(problem)
     return new_numeric_solver(problem) if is_outside(problem.arm) else new_search()
@@ -52,6 +63,8 @@ def out_of_reach(problem: Problem, work: Workspace, solver: Solver) -> int:
         return analytic.out_of_reach(problem, work, solver)
     if isinstance(solver, SixJointSolver):
         return six_joints.out_of_reach(problem, work, solver)
+    if isinstance(solver, FiveJointSolver):
+        return five_joints.out_of_reach(problem, work, solver)
     return numeric.out_of_reach(problem, work, solver)
 
 
@@ -74,7 +87,127 @@ def score_pair(
         return analytic.score_pair(problem, work, body_A, solver)
     if isinstance(solver, SixJointSolver):
         return six_joints.score_pair(problem, work, body_A, solver)
+    if isinstance(solver, FiveJointSolver):
+        return five_joints.score_pair(problem, work, body_A, solver)
     return numeric.score_pair(problem, work, body_A, solver)
+
+
+def quick_look(
+    problem: Problem, work: Workspace, body_A: FloatArray, least: float, solver: Solver
+) -> tuple[int, int]:
+    """Return REACHED if `score_pair` is worth its time at a goal within reach, else a reason.
+
+    An arm with a closed form tries samples of its free joint; for others nothing is quicker than
+    `score_pair`.
+
+    Args:
+        problem: The scene.
+        work: Workspace with environment, base, gripper and goal in place.
+        body_A: The robot's other shapes in A at the current torso level.
+        least: Measure that the solution has to exceed; negative for any.
+        solver: Prepared by `out_of_reach`.
+
+    Returns:
+        Reason and contact code.
+    """
+    if isinstance(solver, Search):
+        return analytic.quick_look(problem, work, body_A, least, solver)
+    return _worth_it(problem, work, body_A, least, solver)
+
+
+@inner
+def _worth_it(
+    problem: Problem, work: Workspace, body_A: FloatArray, least: float, solver: Solver
+) -> tuple[int, int]:
+    return REACHED, NO_CONTACT
+
+
+def is_seen_in_reach(problem: Problem, work: Workspace, solver: Solver) -> bool:
+    """Return whether a test that costs little shows a goal within reach; False without such a test.
+
+    Args:
+        problem: The scene.
+        work: Workspace with the goal in A.
+        solver: The arm's solver.
+    """
+    if isinstance(solver, Search):
+        return _is_in_reach(problem, work, solver)
+    return _is_never_seen(problem, work, solver)
+
+
+@inner
+def _is_in_reach(problem: Problem, work: Workspace, solver: Search) -> bool:
+    return analytic.out_of_reach(problem, work, solver) == REACHED
+
+
+@inner
+def _is_never_seen(problem: Problem, work: Workspace, solver: Solver) -> bool:
+    return False
+
+
+def score_pose(
+    problem: Problem,
+    work: Workspace,
+    body_A: FloatArray,
+    state: int,
+    torso: int,
+    R: FloatArray,
+    p: FloatArray,
+    least: float,
+    solver: Solver,
+) -> tuple[int, int]:
+    """Score one tool pose of a goal with freedom, the gripper being free of the environment.
+
+    An arm of five joints turns the tool about the axis that the goals leave free, and checks the
+    gripper at each of these poses itself.
+
+    Args:
+        problem: The scene.
+        work: Workspace with the environment in the arm base A.
+        body_A: The robot's other shapes in A at the current torso level.
+        state: The environment state.
+        torso: The torso level.
+        R: Tool orientation in W, shape (3, 3).
+        p: Tool position in W [m], shape (3,).
+        least: Measure that a quick look has to exceed, negative for any; THOROUGH for a pose whose
+            solutions are all to be found.
+        solver: `best` is filled with the joint angles [rad] of the solution if there is one.
+
+    Returns:
+        Reason and contact code.
+    """
+    if isinstance(solver, FiveJointSolver):
+        return five_joints.score_turned(problem, work, body_A, state, torso, R, p, least, solver)
+    return _score_single_pose(problem, work, body_A, state, torso, R, p, least, solver)
+
+
+@inner
+def _score_single_pose(
+    problem: Problem,
+    work: Workspace,
+    body_A: FloatArray,
+    state: int,
+    torso: int,
+    R: FloatArray,
+    p: FloatArray,
+    least: float,
+    solver: Solver,
+) -> tuple[int, int]:
+    """Score a tool pose as a goal of its own, see `score_pose`."""
+    pose_in_arm_base(problem, work, torso, R, p)
+    reason = out_of_reach(problem, work, solver)
+    if reason == TOO_FAR:
+        return reason, NO_CONTACT
+    code = gripper_body_contact(problem, work, body_A)
+    if code != NO_CONTACT:
+        return GRIPPER_BLOCKED_BY_ROBOT, code
+    if reason != REACHED:
+        return reason, NO_CONTACT
+    if least > THOROUGH:
+        reason, code = quick_look(problem, work, body_A, least, solver)
+        if reason != REACHED:
+            return reason, code
+    return score_pair(problem, work, body_A, solver)
 
 
 class _OfSolver(AbstractTemplate):
@@ -107,6 +240,7 @@ class _OutOfReach(_OfSolver):
         Search: analytic.out_of_reach,
         NumericSolver: numeric.out_of_reach,
         SixJointSolver: six_joints.out_of_reach,
+        FiveJointSolver: five_joints.out_of_reach,
     }
     entries: ClassVar[dict[Any, Any]] = {}
 
@@ -117,5 +251,39 @@ class _ScorePair(_OfSolver):
         Search: analytic.score_pair,
         NumericSolver: numeric.score_pair,
         SixJointSolver: six_joints.score_pair,
+        FiveJointSolver: five_joints.score_pair,
+    }
+    entries: ClassVar[dict[Any, Any]] = {}
+
+
+@infer_global(score_pose)
+class _ScorePose(_OfSolver):
+    implementations: ClassVar[dict[type, Any]] = {
+        Search: _score_single_pose,
+        NumericSolver: _score_single_pose,
+        SixJointSolver: _score_single_pose,
+        FiveJointSolver: five_joints.score_turned,
+    }
+    entries: ClassVar[dict[Any, Any]] = {}
+
+
+@infer_global(quick_look)
+class _QuickLook(_OfSolver):
+    implementations: ClassVar[dict[type, Any]] = {
+        Search: analytic.quick_look,
+        NumericSolver: _worth_it,
+        SixJointSolver: _worth_it,
+        FiveJointSolver: _worth_it,
+    }
+    entries: ClassVar[dict[Any, Any]] = {}
+
+
+@infer_global(is_seen_in_reach)
+class _IsSeenInReach(_OfSolver):
+    implementations: ClassVar[dict[type, Any]] = {
+        Search: _is_in_reach,
+        NumericSolver: _is_never_seen,
+        SixJointSolver: _is_never_seen,
+        FiveJointSolver: _is_never_seen,
     }
     entries: ClassVar[dict[Any, Any]] = {}

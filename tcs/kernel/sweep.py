@@ -19,7 +19,7 @@ from tcs.kernel.contacts import (
     new_workspace,
 )
 from tcs.kernel.dexterity.measures import measure_at, rounded_inward
-from tcs.kernel.freedom.forms import pose_of
+from tcs.kernel.freedom.forms import FEWEST_JOINTS, pose_of
 from tcs.kernel.freedom.search import score_free
 from tcs.kernel.problem import Problem
 from tcs.kernel.scores import (
@@ -38,9 +38,13 @@ def gripper_contacts(problem: Problem) -> IntArray:
     """Return the contact codes of the gripper with the environment, shape (states, goals).
 
     With the tool at a goal they are independent of the base pose. If goals are free, there is one
-    code for each of their poses, in the order of `Problem.freedom`: shape (states, poses).
+    code for each of their samples, in the order of `Problem.freedom`: shape (states, samples). Of
+    poses that the arm turns, they are NO_CONTACT: the gripper is checked when the arm is solved.
     """
-    states, poses = len(problem.goal_p), len(problem.freedom.u) or problem.goal_p.shape[1]
+    states, first = len(problem.goal_p), problem.freedom.first
+    poses = int(first[-1]) if first.size else problem.goal_p.shape[1]
+    if problem.joints == FEWEST_JOINTS:
+        return np.full((states, poses), NO_CONTACT, np.int64)
     codes = np.empty((states, poses), np.int64)
     _gripper_contacts(problem, new_workspace(problem), codes)
     return codes
@@ -55,15 +59,37 @@ def _gripper_contacts(owned_problem: Problem, owned_work: Workspace, codes: IntA
             if not len(free.first):
                 codes[s, g] = gripper_environment_contact(problem, work, s, g)
                 continue
-            for n in range(free.first[g], free.first[g + 1]):
-                pose_of(free.form[g], free.u[n], problem.goal_R[s, g], problem.goal_p[s, g], R, p)
-                codes[s, n] = gripper_contact_at(problem, work, s, R, p)
+            for n in range(free.first[g + 1] - free.first[g]):
+                u = free.u[free.start[g] + n]
+                pose_of(free.form[g], u, problem.goal_R[s, g], problem.goal_p[s, g], R, p)
+                codes[s, free.first[g] + n] = gripper_contact_at(problem, work, s, R, p)
 
 
 def blocked_grippers(problem: Problem) -> BoolArray:
     """Return whether the gripper is in contact at every pose of a goal, shape (states, goals)."""
     blocked, first = gripper_contacts(problem) != NO_CONTACT, problem.freedom.first
-    return np.logical_and.reduceat(blocked, first[:-1], axis=1) if first.size else blocked
+    if not first.size:
+        return blocked
+    found = np.logical_and.reduceat(blocked, first[:-1], axis=1)
+    _look_further(problem, new_workspace(problem), found)
+    return found
+
+
+@jit
+def _look_further(owned_problem: Problem, owned_work: Workspace, blocked: BoolArray) -> None:
+    """Keep what is blocked at all samples only where it is at all further poses too, in place."""
+    problem, work = unowned(owned_problem), unowned(owned_work)
+    free, R, p = problem.freedom, np.empty((3, 3)), np.empty(3)
+    for s in range(blocked.shape[0]):
+        for g in range(blocked.shape[1]):
+            start, form = free.start[g], free.form[g]
+            samples = free.first[g + 1] - free.first[g]
+            for child in range(free.child_first[start], free.child_first[start + samples]):
+                if not blocked[s, g]:
+                    break
+                u = free.u[start + free.children[child]]
+                pose_of(form, u, problem.goal_R[s, g], problem.goal_p[s, g], R, p)
+                blocked[s, g] = gripper_contact_at(problem, work, s, R, p) != NO_CONTACT
 
 
 def score_slice(

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tcs.kernel import sweep
 from tcs.kernel.contacts import NO_CONTACT
-from tcs.kernel.freedom.forms import COLUMNS, free_goals
+from tcs.kernel.freedom.forms import COLUMNS
+from tcs.kernel.freedom.goals import free_goals
 from tcs.kernel.problem import build_problem
 from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED, TOO_FAR
 from tcs.kernel.sweep import blocked_grippers, gripper_contacts
@@ -51,8 +53,8 @@ def test_sampled_and_drawn_poses_are_within_the_freedom(name):
     tools += list(zip(*drawn_poses(goals.form[0]), strict=True))
     for R, p in tools:
         assert max(free.errors(R, p)) < 1e-9
-    apart = {tuple(np.round(np.append(R, p), 6)) for R, p in tools[: goals.samples[0]]}
-    assert len(apart) == goals.samples[0]
+    apart = {tuple(np.round(np.append(R, p), 6)) for R, p in tools[: goals.first[1]]}
+    assert len(apart) == goals.first[1]
 
 
 def test_a_scene_without_freedom_is_scored_as_before():
@@ -146,12 +148,60 @@ def test_dense_scan_finds_no_further_solution(name, rng, monkeypatch):
 
 
 def test_a_gripper_is_blocked_where_all_its_poses_are():
-    scene = scene_with(FREEDOMS["rotation"])
-    problem = build_problem(scene, toy_grid(states=1))
-    codes = gripper_contacts(problem)
-    first = problem.freedom.first
-    expected = [np.all(codes[0, a:b] != NO_CONTACT) for a, b in itertools.pairwise(first)]
-    np.testing.assert_array_equal(blocked_grippers(problem)[0], expected)
+    scene, grid = scene_with(FREEDOMS["rotation"], goals=4), toy_grid(states=1)
+    problem = build_problem(scene, grid)
+    free, every, samples = problem.freedom, [], []
+    for g in range(4):
+        poses = [at_offset(scene, g, offset(free.form[g], u)) for u in free.u]
+        codes = [gripper_contacts(build_problem(posed, grid))[0, g] for posed in poses]
+        every.append(np.all(np.array(codes) != NO_CONTACT))
+        samples.append(np.all(np.array(codes[: free.first[1]]) != NO_CONTACT))
+    of_samples = gripper_contacts(problem)[0] != NO_CONTACT
+    parts = [np.all(of_samples[a:b]) for a, b in itertools.pairwise(free.first)]
+    np.testing.assert_array_equal(parts, samples)
+    np.testing.assert_array_equal(blocked_grippers(problem)[0], every)
+
+
+def test_a_free_pose_between_blocked_samples_counts(monkeypatch):
+    problem = build_problem(scene_with(FREEDOMS["rotation"], goals=4), toy_grid(states=1))
+    expected = blocked_grippers(problem)
+    assert not np.all(expected)
+    codes = np.zeros_like(gripper_contacts(problem))
+    monkeypatch.setattr(sweep, "gripper_contacts", lambda _: codes)
+    np.testing.assert_array_equal(blocked_grippers(problem), expected)
+
+
+def test_goals_with_the_same_freedom_share_their_poses():
+    rows = np.stack([FREEDOMS[name].row() for name in ("cone", "orientation", "cone")])
+    free = free_goals(rows, CHAIN)
+    assert free.start[0] == free.start[2] != free.start[1]
+    one, both = (free_goals(rows[chosen], CHAIN) for chosen in ([1], [0, 1]))
+    assert len(free.u) == len(both.u)
+    a = free.start[1]
+    np.testing.assert_array_equal(free.u[a : a + len(one.u)], one.u)
+    rows_of = [
+        x.children[x.child_first[i] : x.child_first[i + 1]] for x, i in ((free, a), (one, 0))
+    ]
+    np.testing.assert_array_equal(*rows_of)
+
+
+@pytest.mark.parametrize("name", ["rotation", "cone", "orientation"])
+def test_further_poses_are_next_to_their_samples(name):
+    free = free_goals(FREEDOMS[name].row()[None], CHAIN)
+    samples, poses = free.first[1], len(free.u)
+    assert poses > 2 * samples
+    turns = Rotation.from_matrix([offset(free.form[0], u)[0] for u in free.u])
+    rng = np.random.default_rng(0)
+    for k in rng.choice(np.arange(samples, poses), 40, replace=False):
+        apart = (turns[:samples].inv() * turns[k]).magnitude()
+        nearest = np.sort(apart)[:2]
+        two = np.unique(free.parents[k])
+        if name != "cone":
+            # The angles of a rotation are spaced evenly, and two samples may be as near.
+            np.testing.assert_allclose(np.sort(apart[two]), nearest, atol=1e-9)
+        for i in two:
+            assert k in free.children[free.child_first[i] : free.child_first[i + 1]]
+    assert np.all(np.bincount(free.children, minlength=poses)[samples:] > 0)
 
 
 def test_a_nominal_goal_beside_a_free_one_keeps_its_score():
@@ -170,9 +220,7 @@ def test_a_nominal_goal_beside_a_free_one_keeps_its_score():
 def test_samples_of_any_orientation_leave_no_wide_gap():
     """Half of all orientations are within 25 degrees of a sample; with 96 samples, within 30."""
     goals = free_goals(FREEDOMS["orientation"].row()[None], CHAIN)
-    samples = Rotation.from_matrix(
-        [offset(goals.form[0], u)[0] for u in goals.u[: goals.samples[0]]]
-    )
+    samples = Rotation.from_matrix([offset(goals.form[0], u)[0] for u in goals.u[: goals.first[1]]])
     drawn = Rotation.random(300, random_state=1)
     nearest = [np.degrees((samples.inv() * one).magnitude().min()) for one in drawn]
     assert np.median(nearest) < 25.0

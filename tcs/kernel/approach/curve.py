@@ -12,7 +12,8 @@ from tcs.kernel.approach.grid import PIECES, LineGrid
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant
 from tcs.kernel.contacts import Workspace
-from tcs.kernel.motion.edges import curve_is_free_until
+from tcs.kernel.motion.edges import curve_is_free
+from tcs.kernel.motion.pairs import is_near, take_posture
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
 from tcs.kernel.motion.straight import (
     OFF_LINE,
@@ -27,9 +28,14 @@ from tcs.kernel.motion.straight import (
 from tcs.kernel.numeric.newton import factorise, step_to_goal
 
 FIRST = int_constant(0)
-FEWEST, DOUBLINGS = 2, 3
-"""Number of pieces of the spline tried first, and how often it is doubled until the spline is close
-enough to the line."""
+FEWEST, MOST = 2, 16
+"""Number of pieces of the spline tried first, and the greatest one: it is doubled until the spline
+is close enough to the line."""
+FAR_OFF = 16.0
+"""Error of a spline, as a multiple of what is allowed, above which its pieces are divided by four:
+errors fall with the fourth power of their length."""
+PROBES = 8
+"""Number of contacts on lines that are kept, see `path_touches`."""
 AT_POINT = 1e-7
 """Greatest error of a point of the spline [rad and m], as for solutions."""
 
@@ -40,7 +46,10 @@ class CurveWorkspace(NamedTuple):
     points: FloatArray
     """Joint angles at equal distances of the tool, from the goal on [rad], shape (n, 7)."""
     tangents: FloatArray
-    """Derivatives of the joints by the fraction of the line [rad], shape (n, 7)."""
+    """Derivatives of the joints by the fraction of the line [rad], shape (n, 7), within what limits
+    allow."""
+    slopes: FloatArray
+    """These derivatives as they are, shape (n, 7)."""
     line: StraightWorkspace
     """The line, and kinematics at one posture."""
     goal: FloatArray
@@ -50,17 +59,27 @@ class CurveWorkspace(NamedTuple):
     (2,)."""
     pieces: IntArray
     """Number of pieces of the spline, shape (1,)."""
+    probe: FloatArray
+    """Fractions of the line at which earlier lines to the same goal were blocked, shape
+    (PROBES,)."""
+    probe_pair: IntArray
+    """The pair that blocked each, shape (PROBES,)."""
+    probes: IntArray
+    """Number of all lines that were blocked; the last PROBES are kept; shape (1,)."""
 
 
 def new_curve() -> CurveWorkspace:
     """Return memory for one worker."""
-    most = FEWEST * 2**DOUBLINGS + 1
     return CurveWorkspace(
-        np.empty((most, 7)),
-        np.empty((most, 7)),
+        np.empty((MOST + 1, 7)),
+        np.empty((MOST + 1, 7)),
+        np.empty((MOST + 1, 7)),
         new_straight_workspace(),
         np.empty((4, 3)),
         np.zeros(2, np.int64),
+        np.zeros(1, np.int64),
+        np.zeros(PROBES),
+        np.zeros(PROBES, np.int64),
         np.zeros(1, np.int64),
     )
 
@@ -68,6 +87,7 @@ def new_curve() -> CurveWorkspace:
 @inner
 def place_line(work: Workspace, curve: CurveWorkspace) -> None:
     """Let the line begin at the current goal."""
+    curve.probes[0] = 0
     for r in range(3):
         curve.line.p_AT[r] = work.p_AG[r]
         for c in range(3):
@@ -103,22 +123,29 @@ def fill_spline(
     Returns:
         Whether the joints keep their limits.
     """
-    pieces = FEWEST
-    for _ in range(DOUBLINGS + 1):
-        points, tangents = curve.points[: pieces + 1], curve.tangents[: pieces + 1]
-        if not _fill_points(arm, scene, grid, curve, b, offset, fastest, points, tangents):
+    pieces, known = FEWEST, 0
+    while True:
+        if not _fill_points(arm, scene, grid, curve, b, offset, fastest, pieces, known):
             return False
+        points, tangents = curve.points[: pieces + 1], curve.tangents[: pieces + 1]
+        for n in range(pieces + 1):
+            for k in range(7):
+                tangents[n, k] = curve.slopes[n, k]
         keep_within_limits(scene, points, tangents)
-        worst = 0.0
+        curve.pieces[0] = pieces
+        error = 0.0
         for n in range(pieces):
             take_piece(motion, points, tangents, n)
             error = error_between(scene, motion, curve.line, offset, (n + 0.5) / pieces)
-            worst = max(worst, error)
-        curve.pieces[0] = pieces
-        if worst <= OFF_LINE:
+            if error > OFF_LINE:
+                break
+        if error <= OFF_LINE:
             return True
-        pieces *= 2
-    return False
+        if pieces == MOST:
+            return False
+        known = 4 if error > FAR_OFF * OFF_LINE and 4 * pieces <= MOST else 2
+        pieces *= known
+        _spread_points(curve, pieces, known)
 
 
 @inner
@@ -133,11 +160,72 @@ def spline_is_free(scene: MotionScene, motion: MotionWorkspace, curve: CurveWork
     pieces = curve.pieces[0]
     points, tangents = curve.points[: pieces + 1], curve.tangents[: pieces + 1]
     take_pieces(motion, points, tangents, FIRST, pieces)
-    if curve_is_free_until(scene, motion) == 1.0:
+    if curve_is_free(scene, motion, True):
         return True
-    curve.blocked[0] = min(int(np.ceil(motion.met[0] * PIECES)), PIECES)
+    curve.blocked[0] = _level_after(motion.met[0])
     curve.blocked[1] = motion.contact[0]
+    n = curve.probes[0] % PROBES
+    curve.probe[n], curve.probe_pair[n] = motion.met[0], motion.contact[0]
+    curve.probes[0] += 1
     return False
+
+
+@inner
+def path_touches(
+    arm: ArmSolver,
+    scene: MotionScene,
+    motion: MotionWorkspace,
+    grid: LineGrid,
+    curve: CurveWorkspace,
+    b: int,
+    offset: FloatArray,
+) -> bool:
+    """Return whether the line along `grid.path` is blocked where another one was.
+
+    Of the postures of the line, only those are looked at where earlier lines to the same goal were
+    blocked, and only the pairs that blocked them.
+
+    Args:
+        arm: The arm.
+        scene: The scene.
+        motion: The shapes around the arm are in place.
+        grid: `path` is the free joint at each level.
+        curve: The line is in place; `blocked` is filled if it is blocked.
+        b: The branch.
+        offset: Motion of the tool along the line, in A [m], shape (3,).
+    """
+    last = curve.probes[0]
+    for back in range(min(last, PROBES)):
+        n = (last - 1 - back) % PROBES
+        fraction, k = curve.probe[n], curve.probe_pair[n]
+        for r in range(3):
+            grid.p_AT[r] = curve.line.p_AT[r] + fraction * offset[r]
+        wrist_goal(arm, curve.line.R_AT, grid.p_AT, curve.goal)
+        angle, _ = _path_at(grid.path, fraction)
+        sample_joints(arm, curve.goal, arm.branches[b], angle, motion.q)
+        for joint in range(7):
+            motion.delta[joint] = 0.0
+        take_posture(scene, motion)
+        if is_near(scene, motion, k, False):
+            curve.blocked[0], curve.blocked[1] = _level_after(fraction), k
+            return True
+    return False
+
+
+@inner
+def _level_after(fraction: float) -> int:
+    """Return the level of the grid at or after a fraction of the line."""
+    return min(int(np.ceil(fraction * PIECES)), PIECES)
+
+
+@inner
+def _spread_points(curve: CurveWorkspace, pieces: int, factor: int) -> None:
+    """Move the points of a spline, of fewer pieces by a factor, to where they are among more."""
+    for back in range(pieces // factor + 1):
+        n = pieces // factor - back
+        for k in range(7):
+            curve.points[factor * n, k] = curve.points[n, k]
+            curve.slopes[factor * n, k] = curve.slopes[n, k]
 
 
 @inner
@@ -149,14 +237,30 @@ def _fill_points(
     b: int,
     offset: FloatArray,
     fastest: FloatArray,
-    points: FloatArray,
-    tangents: FloatArray,
+    pieces: int,
+    known: int,
 ) -> bool:
-    """Fill points and tangents of the spline; return whether the joints keep their limits."""
-    line, pieces = curve.line, len(points) - 1
+    """Fill points and slopes of a spline; return whether the joints keep their limits.
+
+    Args:
+        arm: The arm.
+        scene: The scene.
+        grid: `path` is the free joint at each level.
+        curve: The line is in place.
+        b: The branch.
+        offset: Motion of the tool along the line, in A [m], shape (3,).
+        fastest: As for `fill_spline`.
+        pieces: Number of pieces.
+        known: Every how many points one is filled already; 0 if none is.
+    """
+    line, points = curve.line, curve.points
     p_AT = grid.p_AT
     for n in range(pieces + 1):
         fraction, q = n / pieces, points[n]
+        if known > 0 and n % known == 0:
+            if n > 0 and _is_too_fast(points, n, pieces, fastest):
+                return False
+            continue
         for r in range(3):
             line.target[r] = p_AT[r] = line.p_AT[r] + fraction * offset[r]
         wrist_goal(arm, line.R_AT, p_AT, curve.goal)
@@ -167,11 +271,11 @@ def _fill_points(
                 if scene.period[k] > 0.0:
                     turns = np.floor((q[k] - points[n - 1, k]) / scene.period[k] + 0.5)
                     q[k] -= turns * scene.period[k]
-                if abs(q[k] - points[n - 1, k]) * pieces > fastest[k]:
-                    return False
+            if _is_too_fast(points, n, pieces, fastest):
+                return False
         if evaluate_on_line(scene, line, q) > AT_POINT:
             return False
-        newton, tangent = line.newton, tangents[n]
+        newton, tangent = line.newton, curve.slopes[n]
         for r in range(6):
             along = offset[r - 3] if r >= 3 else 0.0
             newton.error[r] = along - newton.J[r, arm.free] * rate
@@ -185,6 +289,15 @@ def _fill_points(
             if abs(tangent[k]) > fastest[k]:
                 return False
     return True
+
+
+@inner
+def _is_too_fast(points: FloatArray, n: int, pieces: int, fastest: FloatArray) -> bool:
+    """Return whether a joint moves too fast from the point before point n to that."""
+    for k in range(7):
+        if abs(points[n, k] - points[n - 1, k]) * pieces > fastest[k]:
+            return True
+    return False
 
 
 @inner

@@ -14,6 +14,7 @@ from tcs.kernel.approach.curve import (
     CurveWorkspace,
     fill_spline,
     new_curve,
+    path_touches,
     place_line,
     spline_is_free,
 )
@@ -33,13 +34,14 @@ from tcs.kernel.approach.grid import (
 )
 from tcs.kernel.approach.scene import LineScene, pair_contact_code
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.cache import inner
+from tcs.kernel.cache import inner, int_constant
 from tcs.kernel.contacts import (
     NO_CONTACT,
     Workspace,
     arm_contact,
     gripper_body_contact,
     new_workspace,
+    place_gripper,
 )
 from tcs.kernel.kinematics import copy_joints
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace, new_motion_workspace
@@ -71,6 +73,10 @@ PHASE = 1e6
 """Above any measure: sort key of postures that are tried later."""
 CLOSED = -2
 """Outcome of a posture that is in contact, or has no path of the free joint."""
+UNKNOWN = -2
+"""In place of a contact: not looked at yet."""
+AT_GOAL = int_constant(0)
+"""Level of the goal."""
 
 
 class Approach(NamedTuple):
@@ -82,14 +88,19 @@ class Approach(NamedTuple):
     scene: MotionScene
     boxes: FloatArray
     """As in `LineScene`."""
+    moving: IntArray
+    """As in `LineScene`."""
     motion: MotionWorkspace
     curve: CurveWorkspace
     offset: FloatArray
     """Motion of the tool from the goal to the begin of the approach, in A [m], shape (3,)."""
     columns: IntArray
     """Number of columns of the grid, and of those that the free joint moves from level to level;
-    column and branch of the posture that scoring found; number of motions followed; torso level;
-    shape (6,)."""
+    column and branch of the posture that scoring found; number of motions followed; torso level; 1
+    if lines are looked at first where others were blocked; shape (7,)."""
+    gripper: IntArray
+    """Contact of the gripper with the robot's body at each level, as a code, or UNKNOWN: it is the
+    same for all postures; then the level at which the gripper is placed; shape (PIECES + 2,)."""
     contact: IntArray
     """First contact that blocked a motion, as a code, shape (1,)."""
 
@@ -103,10 +114,12 @@ def new_approach(problem: Problem, lines: LineScene) -> Approach:
         new_grid(),
         scene,
         lines.boxes,
+        lines.moving,
         new_motion_workspace(scene),
         new_curve(),
         np.empty(3),
-        np.zeros(6, np.int64),
+        np.zeros(7, np.int64),
+        np.zeros(PIECES + 2, np.int64),
         np.zeros(1, np.int64),
     )
 
@@ -146,6 +159,8 @@ def approach_pair(problem: Problem, approach: Approach, fastest: FloatArray, q: 
             if angle < arm.lower[arm.free]:
                 break
             columns[0], columns[4] = place_columns(arm, approach.grid, angle), 0
+        if shift == SHIFTS - 1:
+            columns[6] = 0
         if _search(problem, approach, fastest):
             return REACHED
         if approach.contact[0] == NO_CONTACT:
@@ -246,6 +261,7 @@ def follow_posture(problem: Problem, approach: Approach, fastest: FloatArray, q:
     """
     _prepare(problem, approach, fastest, q)
     b, columns = approach.columns[3], approach.columns
+    columns[6] = 0
     arm, spacing, outcome = problem.arm, approach.grid.origin[1], CLOSED
     for n in range(TIMES + 1):
         if n > 0:
@@ -280,8 +296,11 @@ def _prepare(problem: Problem, approach: Approach, fastest: FloatArray, q: Float
     columns[0] = place_columns(arm, grid, angle)
     columns[1] = _most_columns(arm, grid, fastest)
     columns[2] = int((angle - grid.origin[0]) / grid.origin[1] + 0.5)
-    columns[3], columns[4] = 0, 0
+    columns[3], columns[4], columns[6] = 0, 0, 1
     approach.contact[0] = NO_CONTACT
+    for level in range(PIECES + 1):
+        approach.gripper[level] = UNKNOWN
+    approach.gripper[PIECES + 1] = NOWHERE
     least = np.inf
     for b in range(len(arm.branches)):
         sample_joints(arm, grid.goal[0], arm.branches[b], angle, search.q)
@@ -323,6 +342,17 @@ def _follow(
     outcome = CLOSED
     while grid.onward[b, 0, column] != NOWHERE and columns[4] <= MOST_CURVES:
         take_path(grid, b, column)
+        if columns[6] == 1 and path_touches(
+            problem.arm, scene, motion, grid, curve, b, approach.offset
+        ):
+            outcome = BLOCKED
+            if not is_free:
+                # Closing the node would close it to postures too whose lines lead past the contact.
+                break
+            level = curve.blocked[0]
+            i = column_at(grid, b, column, level)
+            close_node(grid, b, level, i, columns[0], columns[1])
+            continue
         level, contact = _first_contact(problem, approach, b, column)
         # A contact counts on lines only that limits allow.
         if level == NOWHERE or (level > 0 and approach.contact[0] == NO_CONTACT):
@@ -346,6 +376,9 @@ def _follow(
             outcome = BLOCKED
             if approach.contact[0] == NO_CONTACT:
                 approach.contact[0] = contact
+            if approach.gripper[level] >= 0:
+                columns[4] = ENOUGH
+                break
         close_node(grid, b, level, column_at(grid, b, column, level), columns[0], columns[1])
     if outcome != DONE:
         grid.is_open[b, 0, column] = False
@@ -357,13 +390,13 @@ def _follow(
 def _first_contact(problem: Problem, approach: Approach, b: int, column: int) -> tuple[int, int]:
     """Return a level at which the path from a column is in contact, or NOWHERE, and the contact.
 
-    Until a contact is known, most paths are free, and only their ends are checked.
+    Until a contact is known, most paths are free, and only the goal is checked.
     """
     grid = approach.grid
     for n in range(PIECES + 1):
         # The goal, then from the begin of the approach on.
         level = (PIECES + 1 - n) % (PIECES + 1)
-        if 0 < level < PIECES and approach.contact[0] == NO_CONTACT:
+        if level > 0 and approach.contact[0] == NO_CONTACT:
             continue
         i = column_at(grid, b, column, level)
         if grid.is_free[b, level, i]:
@@ -378,13 +411,17 @@ def _first_contact(problem: Problem, approach: Approach, b: int, column: int) ->
 @inner
 def _contact_at(problem: Problem, approach: Approach, b: int, i: int, level: int) -> int:
     """Return the contact of a node of the grid, or NO_CONTACT."""
-    work, grid, q = approach.work, approach.grid, approach.search.q
+    work, grid, q, gripper = approach.work, approach.grid, approach.search.q, approach.gripper
     body_A = problem.body_A[approach.columns[5]]
     for r in range(3):
         work.p_AG[r] = approach.curve.line.p_AT[r] + level / PIECES * approach.offset[r]
-    contact = gripper_body_contact(problem, work, body_A)
-    if contact != NO_CONTACT:
-        return contact
+    if gripper[level] == UNKNOWN:
+        gripper[level] = gripper_body_contact(problem, work, body_A)
+    elif gripper[PIECES + 1] != level:
+        place_gripper(problem, work, work.R_AG, work.p_AG)
+    gripper[PIECES + 1] = level
+    if gripper[level] != NO_CONTACT:
+        return gripper[level]
     angle = grid.origin[0] + i * grid.origin[1]
     sample_joints(problem.arm, grid.goal[level], problem.arm.branches[b], angle, q)
     return arm_contact(problem, work, body_A, q)
@@ -425,16 +462,50 @@ def _list_candidates(problem: Problem, approach: Approach) -> int:
 
 @inner
 def _climb(problem: Problem, approach: Approach, fastest: FloatArray, b: int, i: int) -> None:
-    """Climb from a node whose line is free to a better one less than STRIDE columns away."""
-    grid, columns, step = approach.grid, approach.columns, STRIDE // 2
-    measure, best = grid.measure[b], approach.search.best
-    while step >= 1 and columns[4] <= MOST_CURVES:
+    """Climb from a node whose line is free to a better one less than STRIDE columns away.
+
+    Nodes on the way are followed only where the climb ends; where that one is blocked, the climb
+    begins again.
+    """
+    columns = approach.columns
+    while columns[4] <= MOST_CURVES:
+        j = _better(problem, approach, b, i)
+        if j == i:
+            break
+        if _follow(problem, approach, fastest, b, j, False) == DONE:
+            copy_joints(approach.curve.points[0], approach.search.best)
+            break
+
+
+@inner
+def _better(problem: Problem, approach: Approach, b: int, i: int) -> int:
+    """Return a better node less than STRIDE columns from node i that seems free, i without one."""
+    columns, step, measure = approach.columns, STRIDE // 2, approach.grid.measure[b]
+    while step >= 1:
         for side in range(2):
             j = i + step if side else i - step
             if not 0 <= j < columns[0] or measure[j] <= measure[i]:
                 continue
-            if _follow(problem, approach, fastest, b, j, False) == DONE:
-                copy_joints(approach.curve.points[0], best)
+            if _seems_free(problem, approach, b, j):
                 i = j
                 break
         step //= 2
+    return i
+
+
+@inner
+def _seems_free(problem: Problem, approach: Approach, b: int, column: int) -> bool:
+    """Return whether a node at the goal is free of contact, and its line where others are not."""
+    grid, columns = approach.grid, approach.columns
+    if grid.onward[b, 0, column] == NOWHERE:
+        return False
+    take_path(grid, b, column)
+    if columns[6] == 1 and path_touches(
+        problem.arm, approach.scene, approach.motion, grid, approach.curve, b, approach.offset
+    ):
+        return False
+    if not grid.is_free[b, 0, column]:
+        if _contact_at(problem, approach, b, column, AT_GOAL) != NO_CONTACT:
+            return False
+        grid.is_free[b, 0, column] = True
+    return True

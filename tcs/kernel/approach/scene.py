@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tcs.kernel.arrays import FloatArray
+from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
 from tcs.kernel.cache import inner
 from tcs.kernel.collide import CENTRE, COLUMNS
 from tcs.kernel.contacts import BASE_FIXED, Workspace
@@ -30,6 +30,10 @@ AWAY = 1e3
 """Coordinate of shapes beyond the arm's reach, which are not placed [m]."""
 
 
+ROUNDING = 1e-9
+"""Difference of coordinates that rounding makes [m], above it."""
+
+
 class LineScene(NamedTuple):
     """The scene of all lines of a problem."""
 
@@ -39,6 +43,9 @@ class LineScene(NamedTuple):
     boxes: FloatArray
     """Boxes around groups of the robot's fixed shapes in A at each torso level, packed, shape
     (torso levels, n_boxes, 17)."""
+    moving: IntArray
+    """Fixed shapes of the robot that are elsewhere in A at other torso levels: indices among
+    them."""
 
 
 def approach_scene(problem: Problem) -> LineScene:
@@ -46,10 +53,36 @@ def approach_scene(problem: Problem) -> LineScene:
 
     Pairs of the robot's own shapes that touch at no torso level are left out.
     """
-    every = [torso_scene(problem, torso) for torso in range(problem.torso_levels)]
-    needed = [needed_pairs(scene, problem.environment_bodies) for scene in every]
-    scene = grouped(with_pairs(every[0], np.any(needed, axis=0)), carriers(problem))
-    return LineScene(scene, _boxes(problem, scene))
+    first = torso_scene(problem, 0)
+    needed = needed_pairs(first, problem.environment_bodies)
+    apart = _is_apart_from_torso(problem, first)
+    for torso in range(1, problem.torso_levels):
+        left = ~needed & apart
+        if np.any(left):
+            scene = with_pairs(torso_scene(problem, torso), left)
+            needed[left] = needed_pairs(scene, problem.environment_bodies)
+    scene = grouped(with_pairs(first, needed), carriers(problem))
+    moving = np.flatnonzero(_is_moved(problem)[: len(problem.body_body)])
+    return LineScene(scene, _boxes(problem, scene), moving)
+
+
+def _is_apart_from_torso(problem: Problem, scene: MotionScene) -> BoolArray:
+    """Return which pairs are of a shape that is elsewhere in A at other torso levels.
+
+    Args:
+        problem: The scene and its grid.
+        scene: A scene of it without groups; the result has shape (n_pairs,).
+    """
+    moved = _is_moved(problem)
+    shape = scene.pair[:, 1] - len(scene.links) - problem.environment_body.size
+    found: BoolArray = (shape >= 0) & moved[np.maximum(shape, 0)]
+    return found
+
+
+def _is_moved(problem: Problem) -> BoolArray:
+    """Return which shapes of the robot are elsewhere in A at other torso levels."""
+    moved: BoolArray = np.any(np.abs(problem.body_A - problem.body_A[0]) > ROUNDING, axis=(0, 2))
+    return moved
 
 
 def _boxes(problem: Problem, scene: MotionScene) -> FloatArray:
@@ -74,9 +107,10 @@ def place_scene(
     torso: int,
     scene: MotionScene,
     boxes: FloatArray,
+    moving: IntArray,
     motion: MotionWorkspace,
 ) -> None:
-    """Place the shapes around the arm.
+    """Place the shapes around the arm that are elsewhere than before.
 
     Args:
         problem: The scene and its grid.
@@ -84,6 +118,7 @@ def place_scene(
         torso: Torso level.
         scene: Its centres are filled.
         boxes: Boxes around groups of the robot's fixed shapes at each torso level.
+        moving: As in `LineScene`.
         motion: Its shapes are filled.
     """
     environment, body_A, shapes = work.environment_A, problem.body_A[torso], motion.shapes
@@ -96,7 +131,7 @@ def place_scene(
         for c in range(COLUMNS):
             shapes[at + j, c] = environment[j, c]
     at += len(environment)
-    for j in range(len(problem.body_body)):
+    for j in moving:
         for c in range(COLUMNS):
             shapes[at + j, c] = body_A[j, c]
     at += len(problem.body_body)

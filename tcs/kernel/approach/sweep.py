@@ -117,7 +117,10 @@ def _follow_posture(
 def _place_surroundings(problem: Problem, approach: Approach, torso: int) -> None:
     """Place everything around the arm, the base being in place."""
     environment_in_arm_base(problem, approach.work, torso)
-    place_scene(problem, approach.work, torso, approach.scene, approach.boxes, approach.motion)
+    place_scene(
+        problem, approach.work, torso, approach.scene, approach.boxes, approach.moving,
+        approach.motion,
+    )  # fmt: skip
     approach.columns[5] = torso
 
 

@@ -7,7 +7,8 @@ import numpy as np
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, jit
 from tcs.kernel.dexterity import INVERSE_CONDITION, LIMIT_WEIGHTED, THESIS, UNLIMITED
-from tcs.kernel.kinematics import jacobian
+from tcs.kernel.freedom.forms import FEWEST_JOINTS
+from tcs.kernel.kinematics import jacobian, tool_pose
 from tcs.kernel.problem import Problem
 
 THESIS_SCALE = 1e6
@@ -125,21 +126,54 @@ def clear_fixed(J: FloatArray, joints: int) -> None:
 
 
 @inner
-def inverse_condition_at(
-    chain_R: FloatArray, chain_p: FloatArray, q: FloatArray, joints: int
-) -> float:
-    """Return `inverse_condition` of the Jacobian at joint angles q.
+def weigh(problem: Problem, q: FloatArray, J: FloatArray) -> None:
+    """Weight the columns of J by the distance of the joints q [rad] to their limits, in place.
 
-    Args:
-        chain_R: Rotations of the chain, shape (8, 3, 3).
-        chain_p: Translations of the chain [m], shape (8, 3).
-        q: Joint angles [rad], shape (7,).
-        joints: Number of joints of the arm, as in `Chain`.
+    Source:
+        TOC, det(J W J^T)^(1/6) / (trace(J W J^T) / 6), W = diag of `limit_weight`.
     """
-    J = np.empty((6, 7))
-    jacobian(chain_R, chain_p, q, J)
-    clear_fixed(J, joints)
-    return inverse_condition(J)
+    for k in range(JOINTS):
+        root = np.sqrt(limit_weight(q[k], problem.arm.lower[k], problem.arm.upper[k]))
+        for i in range(6):
+            J[i, k] *= root
+
+
+@inner
+def leave_turn_out(problem: Problem, q: FloatArray, J: FloatArray) -> None:
+    """Replace the six rows of J by the five that the goals of an arm of five joints prescribe.
+
+    The rotation about the axis that they leave free is taken out: two components of the angular
+    velocity remain, perpendicular to it. The sixth row has a single entry, in a column without a
+    joint: its square is the mean of the five eigenvalues of J J^T, so that the least and the
+    greatest of the six are those of the five, and the isotropy of the six is that of the five to
+    the power of 5/6.
+    """
+    link_R, link_p, R, p = np.empty((8, 3, 3)), np.empty((8, 3)), np.empty((3, 3)), np.empty(3)
+    tool_pose(problem.chain_R, problem.chain_p, q, link_R, link_p, R, p)
+    a, across = np.empty(3), np.zeros((2, 3))
+    for r in range(3):
+        a[r] = R[r, 0] * problem.turn[0] + R[r, 1] * problem.turn[1] + R[r, 2] * problem.turn[2]
+    # A unit vector across the axis, in the plane of its two largest components.
+    i = 0
+    for r in range(1, 3):
+        if abs(a[r]) < abs(a[i]):
+            i = r
+    j, k = (i + 1) % 3, (i + 2) % 3
+    length = np.sqrt(a[j] * a[j] + a[k] * a[k])
+    across[0, j], across[0, k] = -a[k] / length, a[j] / length
+    for r in range(3):
+        s, t = (r + 1) % 3, (r + 2) % 3
+        across[1, r] = a[s] * across[0, t] - a[t] * across[0, s]
+    trace = 0.0
+    for c in range(JOINTS):
+        x, y, z = J[0, c], J[1, c], J[2, c]
+        for r in range(2):
+            J[r, c] = across[r, 0] * x + across[r, 1] * y + across[r, 2] * z
+            J[2 + r, c] = J[3 + r, c]
+        J[4, c], J[5, c] = J[5, c], 0.0
+        for r in range(5):
+            trace += J[r, c] * J[r, c]
+    J[5, 0] = np.sqrt(trace / 5.0)
 
 
 @jit
@@ -269,39 +303,30 @@ def limit_weight(q: float, lower: float, upper: float) -> float:
     return max(LEAST_WEIGHT, 1.0 - 0.5 ** (margin + 1.0))
 
 
-@inner
-def limit_weighted_isotropy_at(problem: Problem, q: FloatArray) -> float:
-    """Return JLWKI at joint angles q [rad], shape (7,): the isotropy with weighted joints.
-
-    Source:
-        TOC, det(J W J^T)^(1/6) / (trace(J W J^T) / 6), W = diag of `limit_weight`.
-    """
-    J = np.empty((6, 7))
-    jacobian(problem.chain_R, problem.chain_p, q, J)
-    clear_fixed(J, problem.joints)
-    for k in range(JOINTS):
-        root = np.sqrt(limit_weight(q[k], problem.arm.lower[k], problem.arm.upper[k]))
-        for i in range(6):
-            J[i, k] *= root
-    return isotropy(J)
-
-
 @jit
 def measure_at(problem: Problem, q: FloatArray) -> float:
     """Return the problem's dexterity measure at joint angles q [rad], shape (7,).
+
+    Of an arm of five joints, it is that of the five directions which its goals prescribe.
 
     Source:
         TCS eq. (2) or ITCM thesis eq. (20), multiplied by the penalty as in thesis eq. (22); or
         JLWKI of TOC.
     """
+    J = np.empty((6, 7))
+    jacobian(problem.chain_R, problem.chain_p, q, J)
+    clear_fixed(J, problem.joints)
     if problem.measure.of == LIMIT_WEIGHTED:
-        return limit_weighted_isotropy_at(problem, q)
+        weigh(problem, q, J)
+    if problem.joints == FEWEST_JOINTS:
+        leave_turn_out(problem, q, J)
     if problem.measure.of == INVERSE_CONDITION:
-        value = inverse_condition_at(problem.chain_R, problem.chain_p, q, problem.joints)
+        value = inverse_condition(J)
     else:
-        value = isotropy_at(problem.chain_R, problem.chain_p, q, problem.joints)
-    arm = problem.arm
-    return value * limit_penalty(q, arm.lower, arm.upper, problem.measure.penalty)
+        value = isotropy(J)
+        if problem.joints == FEWEST_JOINTS:
+            value = value**1.2
+    return value * limit_penalty(q, problem.arm.lower, problem.arm.upper, problem.measure.penalty)
 
 
 @jit

@@ -8,11 +8,14 @@ perpendicular. Parameters that are not free are zero.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
-from tcs.kernel.arrays import Chain, FloatArray, IntArray
+from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner
 from tcs.kernel.low_discrepancy import spread
 
@@ -25,87 +28,38 @@ ANGLES = 24
 """Samples of a free angle about an axis: one every 15 degrees."""
 SAMPLES = (1, ANGLES, 32, 96, 192, 256, 256)
 """Number of samples by the number of free parameters."""
-ORIENTATIONS = 384
+ORIENTATIONS = 288
 """Least number of samples of a tool that may have any orientation: its angles range over full
-turns, and with 96 a PR2 missed 7 % of the pairs that it reaches with 384."""
+turns."""
 SUBDIVISIONS = 4
 """Parts into which the spacing of the samples is divided where none of them reaches a goal."""
 TO_THE_RIM = 4.0 / 3.0
 """Factor that spreads samples of tilts and positions before they are clipped to the bounds."""
+FURTHER = 20
+"""Further poses for each sample of a tool that may have any orientation."""
+MIRROR = np.array([-1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
+"""Factors of the coordinates of the same pose by the other quaternion."""
 FULL_TURN = 2.0 * np.pi
+TILTS = 96
+"""Number of samples of the direction of the axis for such an arm if it may be any."""
+FEWEST_JOINTS = 5
+"""Number of joints of an arm that finds the angle about the axis together with its joints."""
 
 
-class FreeGoals(NamedTuple):
-    """The freedom of the goals of a problem; `first` is empty if no goal is free.
+class Poses(NamedTuple):
+    """The poses of a freedom: its samples, then further ones next to those."""
 
-    The poses of a goal are its samples, then further ones near those: `parents` names the samples
-    between which they lie.
-    """
-
-    form: FloatArray
-    """Columns as above, then the unit vectors e1 and e2, shape (goals, COLUMNS + 6)."""
-    step: FloatArray
-    """Spacing of the samples of each parameter [rad or m], 0 where not free, shape
-    (goals, PARAMETERS)."""
-    first: IntArray
-    """First pose of each goal, and the number of poses, shape (goals + 1,)."""
-    samples: IntArray
-    """Number of samples of each goal, shape (goals,)."""
-    parents: IntArray
-    """The two samples of the goal, by their numbers, next to each pose, shape (poses, 2)."""
     u: FloatArray
-    """Parameters of each pose [rad and m], shape (poses, PARAMETERS)."""
-    reach: float
-    """Upper bound of the distance of the tool from the first joint [m]."""
-
-
-def no_freedom() -> FreeGoals:
-    """Return the freedom of a problem in which no goal is free."""
-    return FreeGoals(
-        form=np.empty((0, COLUMNS + 6)),
-        step=np.empty((0, PARAMETERS)),
-        first=np.empty(0, np.int64),
-        samples=np.empty(0, np.int64),
-        parents=np.empty((0, 2), np.int64),
-        u=np.empty((0, PARAMETERS)),
-        reach=np.inf,
-    )
-
-
-def free_goals(rows: FloatArray, chain: Chain) -> FreeGoals:
-    """Return the freedom of goals, with their sampled poses.
-
-    Args:
-        rows: The freedom of each goal, shape (goals, COLUMNS); a row of zeros for none.
-        chain: The arm.
-    """
-    if not np.any(rows):
-        return no_freedom()
-    slides = chain.slides > 0.0
-    farthest = np.maximum(np.abs(chain.lower), np.abs(chain.upper))
-    longest = float(farthest[slides] @ chain.slides[slides])
-    forms, steps, first, samples, parents, poses = [], [], [0], [], [], []
-    for row in rows:
-        form = np.concatenate([row, *_basis(row)])
-        step = spacing(form)
-        base = sampled(form, step)
-        more, near = _between(form, step, base)
-        forms.append(form)
-        steps.append(step)
-        samples.append(len(base))
-        own = np.repeat(np.arange(len(base))[:, None], 2, axis=1)
-        parents.append(np.concatenate([own, near]))
-        poses.append(np.concatenate([base, more]))
-        first.append(first[-1] + len(poses[-1]))
-    return FreeGoals(
-        form=np.array(forms),
-        step=np.array(steps),
-        first=np.array(first, np.int64),
-        samples=np.array(samples, np.int64),
-        parents=np.concatenate(parents).astype(np.int64),
-        u=np.ascontiguousarray(np.concatenate(poses)),
-        reach=float(np.linalg.norm(chain.p, axis=1).sum() + longest),
-    )
+    """Parameters of each pose [rad and m], shape (n, PARAMETERS)."""
+    samples: int
+    """Number of samples."""
+    parents: IntArray
+    """The two samples next to each pose, itself for a sample, shape (n, 2)."""
+    child_first: IntArray
+    """First of the further poses next to each pose in `children`, and their number, shape
+    (n + 1,)."""
+    children: IntArray
+    """Further poses by their numbers: each twice, unless both its samples are one."""
 
 
 def spacing(form: FloatArray) -> FloatArray:
@@ -122,8 +76,9 @@ def spacing(form: FloatArray) -> FloatArray:
 def sample_count(form: FloatArray) -> int:
     """Return the number of samples of a freedom, for each of its equivalent angles."""
     count = SAMPLES[len(free_parameters(form))]
-    is_any_orientation = form[ROTATES] and form[TILT] >= np.pi
-    return max(count, ORIENTATIONS) if is_any_orientation else count
+    if form[TILT] < np.pi:
+        return count
+    return max(count, ORIENTATIONS if form[ROTATES] else TILTS)
 
 
 def free_parameters(form: FloatArray) -> list[int]:
@@ -141,24 +96,12 @@ def sampled(form: FloatArray, step: FloatArray) -> FloatArray:
     the box, where goals at the edge of the workspace are reached. Each equivalent angle of a
     symmetric tool has the same samples.
     """
-    free = free_parameters(form)
     count = sample_count(form)
-    u = np.zeros((count, PARAMETERS))
-    if free == [0]:
+    if free_parameters(form) == [0]:
+        u = np.zeros((count, PARAMETERS))
         u[:, 0] = np.arange(count) * step[0]
-    elif free:
-        unit = spread(count - 1, len(free))
-        for k, parameter in enumerate(free):
-            if parameter == 0:
-                u[1:, 0] = FULL_TURN * unit[:, k]
-            elif parameter == 1:
-                cap = np.minimum(TO_THE_RIM * unit[:, k], 1.0)
-                angle = np.arccos(1.0 - (1.0 - np.cos(form[TILT])) * cap)
-                azimuth = FULL_TURN * unit[:, k + 1]
-                u[1:, 1], u[1:, 2] = angle * np.cos(azimuth), angle * np.sin(azimuth)
-            elif parameter > 2:
-                along = np.clip(TO_THE_RIM * (2.0 * unit[:, k] - 1.0), -1.0, 1.0)
-                u[1:, parameter] = along * form[HALF + parameter - 3]
+    else:
+        u = _spread_over(form, count)
     if form[ROTATES] or form[FOLD] <= 1:
         return u
     turns = []
@@ -167,6 +110,78 @@ def sampled(form: FloatArray, step: FloatArray) -> FloatArray:
         turned[:, 0] = k * FULL_TURN / form[FOLD]
         turns.append(turned)
     return np.concatenate(turns)
+
+
+def _spread_over(form: FloatArray, count: int) -> FloatArray:
+    """Return the nominal pose and a low-discrepancy sequence of others, shape (count, 6)."""
+    free = free_parameters(form)
+    u = np.zeros((count, PARAMETERS))
+    if not free:
+        return u
+    unit = spread(count - 1, len(free))
+    for k, parameter in enumerate(free):
+        if parameter == 0:
+            u[1:, 0] = FULL_TURN * unit[:, k]
+        elif parameter == 1:
+            # The rim of all directions is a single one.
+            factor = TO_THE_RIM if form[TILT] < np.pi else 1.0
+            cap = np.minimum(factor * unit[:, k], 1.0)
+            angle = np.arccos(1.0 - (1.0 - np.cos(form[TILT])) * cap)
+            azimuth = FULL_TURN * unit[:, k + 1]
+            u[1:, 1], u[1:, 2] = angle * np.cos(azimuth), angle * np.sin(azimuth)
+        elif parameter > 2:
+            along = np.clip(TO_THE_RIM * (2.0 * unit[:, k] - 1.0), -1.0, 1.0)
+            u[1:, parameter] = along * form[HALF + parameter - 3]
+    return u
+
+
+@lru_cache(maxsize=64)
+def poses_of(key: bytes) -> Poses:
+    """Return the poses of a freedom, whose row of `FreeGoals.form` has these bytes."""
+    form = np.frombuffer(key)
+    step = spacing(form)
+    samples = sampled(form, step)
+    if form[TILT] < np.pi:
+        more, near = _between(form, step, samples)
+    else:
+        more, near = _next_to(form, samples)
+    # A pose between two samples is listed with both, one about a sample once.
+    listed = np.ones(near.shape, bool)
+    listed[:, 1] = near[:, 0] != near[:, 1]
+    number = np.arange(len(samples), len(samples) + len(more))
+    pose = np.repeat(number[:, None], 2, axis=1)[listed]
+    order = np.argsort(near[listed], kind="stable")
+    counts = np.bincount(near[listed], minlength=len(samples) + len(more))
+    own = np.repeat(np.arange(len(samples))[:, None], 2, axis=1)
+    return Poses(
+        u=np.concatenate([samples, more]),
+        samples=len(samples),
+        parents=np.concatenate([own, near]).astype(np.int64),
+        child_first=np.cumsum([0, *counts]),
+        children=pose[order].astype(np.int64),
+    )
+
+
+def _next_to(form: FloatArray, samples: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Return further poses of a tool of any orientation, and the two samples nearest to each.
+
+    They go on where the sequence of the samples ends, so that all together are spread evenly.
+    """
+    count = 1 + (1 + FURTHER) * (len(samples) - 1)
+    more, here = _spread_over(form, count)[len(samples) :], _coordinates(form, samples)
+    # A rotation is a unit quaternion or its negative.
+    both = np.concatenate([here, here * MIRROR])
+    near = cKDTree(both).query(_coordinates(form, more), k=2)[1] % len(here)
+    return more, near.astype(np.int64)
+
+
+def _coordinates(form: FloatArray, u: FloatArray) -> FloatArray:
+    """Return points whose distances are those of poses: quaternions, and positions in the box."""
+    tilt = Rotation.from_rotvec(u[:, 1:2] * form[9:12] + u[:, 2:3] * form[12:15])
+    about = Rotation.from_rotvec(u[:, :1] * form[AXIS : AXIS + 3])
+    half = form[HALF : HALF + 3]
+    inside = u[:, 3:6] / np.where(half > 0.0, half, 1.0)
+    return np.concatenate([(tilt * about).as_quat(), inside], axis=1)
 
 
 def _between(
@@ -201,16 +216,6 @@ def _is_within(form: FloatArray, u: FloatArray) -> bool:
     """Return whether parameters are within a freedom."""
     half = form[HALF : HALF + 3]
     return bool(np.hypot(u[1], u[2]) <= form[TILT] and np.all(np.abs(u[3:6]) <= half))
-
-
-def _basis(row: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return two unit vectors perpendicular to the axis and to each other."""
-    axis = row[AXIS : AXIS + 3]
-    if not np.any(axis):
-        return np.zeros(3), np.zeros(3)
-    first = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
-    first = first / np.linalg.norm(first)
-    return first, np.cross(axis, first)
 
 
 @inner
@@ -253,6 +258,16 @@ def pose_of(
                 )
                 total += R_WG[r, k] * part
             R_WT[r, c] = total
+
+
+@inner
+def turned_about(R: FloatArray, axis: FloatArray, angle: float, out: FloatArray) -> None:
+    """Fill R Rot(axis, angle), shape (3, 3), with a unit axis and an angle [rad]."""
+    about = np.empty((3, 3))
+    _rotation(axis[0], axis[1], axis[2], angle, about)
+    for r in range(3):
+        for c in range(3):
+            out[r, c] = R[r, 0] * about[0, c] + R[r, 1] * about[1, c] + R[r, 2] * about[2, c]
 
 
 @inner

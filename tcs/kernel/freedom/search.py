@@ -7,14 +7,9 @@ import numpy as np
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.base_pose import pose_in_arm_base
 from tcs.kernel.cache import inner
-from tcs.kernel.contacts import (
-    NO_CONTACT,
-    Workspace,
-    gripper_body_contact,
-    gripper_contact_at,
-)
+from tcs.kernel.contacts import NO_CONTACT, Workspace, gripper_contact_at
 from tcs.kernel.dexterity.measures import measure_at
-from tcs.kernel.freedom.forms import HALF, PARAMETERS, TILT, pose_of
+from tcs.kernel.freedom.forms import FEWEST_JOINTS, HALF, PARAMETERS, TILT, pose_of
 from tcs.kernel.kinematics import copy_joints
 from tcs.kernel.problem import Problem
 from tcs.kernel.scores import (
@@ -25,38 +20,20 @@ from tcs.kernel.scores import (
     REACHED,
     TOO_FAR,
 )
-from tcs.kernel.solvers import Solver, out_of_reach, score_pair
+from tcs.kernel.solvers import THOROUGH, Solver, is_seen_in_reach, score_pose
 
 ROUNDS = 5
 """Number of refinement rounds; each halves the distance of the poses tried from the best one."""
 PROMISING = 2
-"""Progress of a pose from which further poses next to it are tried."""
-
-
-@inner
-def score_pose(
-    problem: Problem, work: Workspace, body_A: FloatArray, solver: Solver
-) -> tuple[int, int]:
-    """Score the tool pose in `work.R_AG` and `work.p_AG`; the gripper is free of the environment.
-
-    Args:
-        problem: The scene.
-        work: Workspace with the environment in the arm base A.
-        body_A: The robot's other shapes in A at the current torso level.
-        solver: `best` is filled with the joint angles [rad] of the solution if there is one.
-
-    Returns:
-        Reason and contact code.
-    """
-    reason = out_of_reach(problem, work, solver)
-    if reason == TOO_FAR:
-        return reason, NO_CONTACT
-    code = gripper_body_contact(problem, work, body_A)
-    if code != NO_CONTACT:
-        return GRIPPER_BLOCKED_BY_ROBOT, code
-    if reason != REACHED:
-        return reason, NO_CONTACT
-    return score_pair(problem, work, body_A, solver)
+"""Progress of a sample from which further poses next to it are tried."""
+CLOSE, PART = 4, 3
+"""Progress from which all of the poses next to a sample of any orientation are tried; next to
+others, one in PART is."""
+NEAR = 0.96
+"""Fraction of the best measure so far that a quick look at another sample has to show: the measures
+at samples of the free joint are this close to the best between them."""
+ANY = -1.0
+"""Bound of a measure that every solution exceeds."""
 
 
 @inner
@@ -71,16 +48,16 @@ def score_free(
 ) -> tuple[int, int]:
     """Score a goal over its freedom: the best of its poses, refined.
 
-    The samples are tried first. Where none reaches the goal, those between samples that come close
-    follow. About the best pose, each free parameter is then varied by half the spacing, a quarter,
-    and so on.
+    The samples are tried first. Where none reaches the goal, further poses follow next to those
+    that come close, until one reaches it. About the best pose, each free parameter is then varied
+    by half the spacing, a quarter, and so on.
 
     Args:
         problem: The scene.
         work: Workspace with the environment in the arm base A.
         solver: `best` is filled with the joint angles [rad] of the solution if there is one.
-        grippers: Contact codes of the gripper with the environment at each pose, shape (states,
-            poses).
+        grippers: Contact codes of the gripper with the environment at each sample, shape (states,
+            samples).
         state: The environment state.
         torso: The torso level.
         g: The goal.
@@ -91,37 +68,64 @@ def score_free(
     free, body_A = problem.freedom, problem.body_A[torso]
     R_WG, p_WG, form = problem.goal_R[state, g], problem.goal_p[state, g], free.form[g]
     R, p = np.empty((3, 3)), np.empty(3)
-    first, samples = free.first[g], free.samples[g]
     reason, contact, farthest = TOO_FAR, NO_CONTACT, -1
     if _is_out_of_span(problem, work, state, torso, g):
         return TOO_FAR, NO_CONTACT
+    start, samples = free.start[g], free.first[g + 1] - free.first[g]
     progress = np.zeros(samples, np.int64)
-    best, value, top = np.empty(7), -1.0, -1
-    for n in range(free.first[g + 1] - first):
-        if n >= samples:
-            if top >= 0:
-                break
-            near = free.parents[first + n]
-            if progress[near[0]] < PROMISING and progress[near[1]] < PROMISING:
-                continue
-        why, code = GRIPPER_BLOCKED_BY_ENVIRONMENT, grippers[state, first + n]
+    # Poses of any orientation are many: what one of them leaves out, another one finds.
+    usual = ANY if form[TILT] >= np.pi else THOROUGH
+    best, value, top, least = np.empty(7), -1.0, -1, usual
+    for n in range(samples):
+        pose_of(form, free.u[start + n], R_WG, p_WG, R, p)
+        why, code = GRIPPER_BLOCKED_BY_ENVIRONMENT, grippers[state, free.first[g] + n]
         if code == NO_CONTACT:
-            pose_of(form, free.u[first + n], R_WG, p_WG, R, p)
-            pose_in_arm_base(problem, work, torso, R, p)
-            why, code = score_pose(problem, work, body_A, solver)
+            why, code = score_pose(problem, work, body_A, state, torso, R, p, least, solver)
         if why == REACHED:
             measure = measure_at(problem, solver.best)
             if measure > value:
-                value, top = measure, n
+                value, top, least = measure, n, NEAR * measure
                 copy_joints(solver.best, best)
         came = progress_of(why)
-        if n < samples:
-            progress[n] = came
+        progress[n] = came
+        if why == GRIPPER_BLOCKED_BY_ENVIRONMENT and top < 0:
+            # A pose nearby, at which the gripper is free, may be reached. An arm of five joints
+            # looks at its gripper only where it reaches the pose.
+            pose_in_arm_base(problem, work, torso, R, p)
+            if problem.joints == FEWEST_JOINTS or is_seen_in_reach(problem, work, solver):
+                progress[n] = CLOSE
         if came > farthest:
             farthest, reason, contact = came, why, code
+    n = 0
+    while top < 0 and n < samples:
+        first, last = free.child_first[start + n], free.child_first[start + n + 1]
+        if progress[n] < PROMISING:
+            last = first
+        elif form[TILT] >= np.pi and progress[n] < CLOSE:
+            last = first + (last - first) // PART
+        for child in range(first, last):
+            k = free.children[child]
+            nearest = free.parents[start + k, 0]
+            if nearest != n and progress[nearest] >= progress[n]:
+                # Tried as a pose next to the other sample.
+                continue
+            pose_of(form, free.u[start + k], R_WG, p_WG, R, p)
+            why, code = GRIPPER_BLOCKED_BY_ENVIRONMENT, NO_CONTACT
+            if problem.joints > FEWEST_JOINTS:
+                code = gripper_contact_at(problem, work, state, R, p)
+            if code == NO_CONTACT:
+                why, code = score_pose(problem, work, body_A, state, torso, R, p, usual, solver)
+            came = progress_of(why)
+            if came > farthest:
+                farthest, reason, contact = came, why, code
+            if why == REACHED:
+                value, top = measure_at(problem, solver.best), k
+                copy_joints(solver.best, best)
+                break
+        n += 1
     if top < 0:
         return reason, contact
-    _refine(problem, work, solver, state, torso, g, free.u[first + top], best, value)
+    _refine(problem, work, solver, state, torso, g, free.u[start + top], best, value)
     copy_joints(best, solver.best)
     return REACHED, NO_CONTACT
 
@@ -155,10 +159,12 @@ def _refine(
                 trial[parameter] += step if side == 0 else -step
                 clip(form, trial)
                 pose_of(form, trial, R_WG, p_WG, R, p)
-                if gripper_contact_at(problem, work, state, R, p) != NO_CONTACT:
+                if problem.joints > FEWEST_JOINTS and (
+                    gripper_contact_at(problem, work, state, R, p) != NO_CONTACT
+                ):
                     continue
-                pose_in_arm_base(problem, work, torso, R, p)
-                why, _ = score_pose(problem, work, body_A, solver)
+                least = NEAR * value
+                why, _ = score_pose(problem, work, body_A, state, torso, R, p, least, solver)
                 if why != REACHED:
                     continue
                 measure = measure_at(problem, solver.best)

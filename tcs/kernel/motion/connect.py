@@ -89,21 +89,30 @@ def connect(
 def _certified_path(scene: MotionScene, work: MotionWorkspace, trees: Trees, shortcuts: int) -> int:
     """Fill the path over the nodes that have met, `trees.met`, with certified edges.
 
-    With shortcuts, only the edges are certified that stay when postures have been dropped.
+    With shortcuts, only the edges are certified that are left in the end, if that succeeds; else
+    those that stay when postures have been dropped, and those of shortcuts.
 
     Returns:
         Number of postures of the path; 0 if an edge is blocked, which is then removed.
     """
+    first, second = trees.met[0], trees.met[1]
     if shortcuts > 0:
-        count = _path(scene, trees, trees.met[0], trees.met[1])
-        count = drop_postures(scene, work, trees, count)
-        if path_is_certified(scene, work, trees, count):
-            return cut_corners(scene, work, trees, count, shortcuts)
-    for side in range(2):
-        if not _branch_is_certified(scene, work, trees, side, trees.met[side]):
-            return 0
-    count = _path(scene, trees, trees.met[0], trees.met[1])
-    return cut_corners(scene, work, trees, count, shortcuts)
+        for certify in (False, True):
+            count = _path(scene, trees, first, second)
+            count = drop_postures(scene, work, trees, count, certify)
+            if not certify:
+                count = cut_corners(scene, work, trees, count, shortcuts, False)
+            if path_is_certified(scene, work, trees, count):
+                if certify:
+                    count = cut_corners(scene, work, trees, count, shortcuts, True)
+                return count
+    if not (
+        _branch_is_certified(scene, work, trees, 0, first)
+        and _branch_is_certified(scene, work, trees, 1, second)
+    ):
+        return 0
+    count = _path(scene, trees, first, second)
+    return cut_corners(scene, work, trees, count, shortcuts, True)
 
 
 @inner

@@ -23,7 +23,7 @@ from tcs.kernel.motion.pairs import (
     take_posture,
 )
 from tcs.kernel.motion.planes import take_twists
-from tcs.kernel.motion.scene import DEPTH, MotionScene, MotionWorkspace
+from tcs.kernel.motion.scene import LISTED, WIDE, MotionScene, MotionWorkspace
 from tcs.kernel.views import unowned
 
 RESOLUTION = 1e-5
@@ -73,11 +73,12 @@ def posture_contact(owned_scene: MotionScene, owned_work: MotionWorkspace, q: Fl
 
 @jit
 def certified(owned_scene: MotionScene, owned_work: MotionWorkspace, control: FloatArray) -> float:
-    """Return how far a curve is certified free of contact, from its begin: 1 for all of it.
+    """Return 1 if a curve is certified free of contact, else where it is blocked, below 1.
 
     Args:
         owned_scene: The scene.
-        owned_work: Scratch; where the result is below 1, `contact` is the pair that blocks it.
+        owned_work: Scratch; where the result is below 1, `contact` is the pair that blocks it
+            there.
         control: Control points of the cubic Bezier curve [rad], shape (4, 7).
     """
     scene, work = unowned(owned_scene), unowned(owned_work)
@@ -85,7 +86,7 @@ def certified(owned_scene: MotionScene, owned_work: MotionWorkspace, control: Fl
     for m in range(4):
         for k in range(7):
             work.control[m, k] = control[m, k]
-    return curve_is_free_until(scene, work)
+    return 1.0 if curve_is_free(scene, work, False) else work.met[0]
 
 
 @inner
@@ -133,12 +134,19 @@ def edge_is_certified(
         step = end[k] - start[k]
         control[0, k], control[3, k] = start[k], end[k]
         control[1, k], control[2, k] = start[k] + step / 3.0, end[k] - step / 3.0
-    return curve_is_free_until(scene, work) == 1.0
+    return curve_is_free(scene, work, False)
 
 
 @inner
-def curve_is_free_until(scene: MotionScene, work: MotionWorkspace) -> float:
-    """Return how far the curve `work.control` is certified, from its begin; 1 for all of it."""
+def curve_is_free(scene: MotionScene, work: MotionWorkspace, at_end: bool) -> bool:
+    """Return whether the curve `work.control` is certified; else `contact` blocks it, at `met`.
+
+    Args:
+        scene: The scene.
+        work: Holds the curve.
+        at_end: Whether the end of the curve is looked at first of all: it is where a curve that
+            begins at a free posture is blocked most often.
+    """
     take_middle(work, 0.0, 1.0)
     moved = 0.0
     for k in range(7):
@@ -149,17 +157,16 @@ def curve_is_free_until(scene: MotionScene, work: MotionWorkspace) -> float:
         begin, end = n / parts, (n + 1) / parts
         _take_piece(scene, work, begin, end)
         count = list_near(scene, work, ROUNDING, len(scene.pair))
-        until = listed_are_free_until(scene, work, count, begin, end)
-        if until < end:
-            return until
-    return 1.0
+        if not _listed_are_free(scene, work, count, begin, end, at_end and n == parts - 1):
+            return False
+    return True
 
 
 @inner
-def listed_are_free_until(
-    scene: MotionScene, work: MotionWorkspace, count: int, begin: float, end: float
-) -> float:
-    """Return how far a piece of `work.control` is certified for listed pairs; `end` for all of it.
+def _listed_are_free(
+    scene: MotionScene, work: MotionWorkspace, count: int, begin: float, end: float, at_end: bool
+) -> bool:
+    """Return whether a piece of `work.control` is certified for listed pairs.
 
     Args:
         scene: The scene.
@@ -168,21 +175,46 @@ def listed_are_free_until(
         count: Number of pairs.
         begin: Begin of the piece, in [0, 1].
         end: End of the piece.
+        at_end: Whether to look at its end before its halves.
     """
-    for m in range(count):
-        k = work.pairs[m]
-        if not is_of_groups(scene, k) and is_near(scene, work, k, False):
-            work.contact[0], work.met[0] = k, 0.5 * (begin + end)
-            work.hits[k] += 1
-            return begin
-    return _halves_are_free_until(scene, work, count, begin, end)
+    if count == 0:
+        return True
+    if _listed_touch(scene, work, count, 0.5 * (begin + end)):
+        return False
+    if at_end:
+        take_middle(work, end, end)
+        take_posture(scene, work)
+        if _listed_touch(scene, work, count, end):
+            return False
+    return _halves_are_free(scene, work, count, begin, end)
 
 
 @inner
-def _halves_are_free_until(
+def _listed_touch(scene: MotionScene, work: MotionWorkspace, count: int, at: float) -> bool:
+    """Return whether one of the first pairs in `pairs` is in contact at the current posture."""
+    for m in range(count):
+        k = work.pairs[m]
+        if not is_of_groups(scene, k) and is_near(scene, work, k, False):
+            _block(work, k, at)
+            return True
+    return False
+
+
+@inner
+def _block(work: MotionWorkspace, k: int, at: float) -> None:
+    """Record that pair k blocks the curve."""
+    work.contact[0], work.met[0] = k, at
+    work.hits[k] += 1
+
+
+@inner
+def _halves_are_free(
     scene: MotionScene, work: MotionWorkspace, count: int, begin: float, end: float
-) -> float:
-    """Return how far both halves of a piece of `work.control` are certified; `end` for all of it.
+) -> bool:
+    """Return whether both halves of a piece of `work.control` are certified.
+
+    Pieces are divided level by level, so that a contact is met on the longest pieces that show it;
+    depth first once memory is short.
 
     Args:
         scene: The scene.
@@ -191,55 +223,60 @@ def _halves_are_free_until(
         begin: Begin of the piece, in [0, 1].
         end: End of the piece.
     """
-    if count == 0:
-        return end
-    whole, top = end, 2
-    span, stretch = work.span, work.stretch
+    span, stretch, most = work.span, work.stretch, len(work.span)
     _push_halves(work, 0, begin, end, 0, count)
-    while top:
-        top -= 1
-        begin, end = span[top, 0], span[top, 1]
-        first, last = stretch[top, 0], stretch[top, 1]
-        left = _uncertified(scene, work, begin, end, first, last)
-        if left < 0 or (left > 0 and top + 2 > 2 * DEPTH):
-            work.met[0] = 0.5 * (begin + end)
-            work.hits[work.contact[0]] += 1
-            return begin
+    head, top, used = 0, 2, count
+    while head < top:
+        by_level = top + 2 <= WIDE and used <= LISTED
+        if by_level:
+            n, head = head, head + 1
+        else:
+            top -= 1
+            n, used = top, stretch[top, 1]
+        begin, end = span[n, 0], span[n, 1]
+        left = _uncertified(scene, work, begin, end, stretch[n, 0], stretch[n, 1], used)
+        if left < 0 or (left > 0 and top + 2 > most):
+            _block(work, work.contact[0], 0.5 * (begin + end))
+            return False
         if left > 0:
-            _push_halves(work, top, begin, end, last, last + left)
-            top += 2
-    return whole
+            _push_halves(work, top, begin, end, used, used + left)
+            top, used = top + 2, used + left
+    return True
 
 
 @inner
 def _push_halves(
     work: MotionWorkspace, top: int, begin: float, end: float, first: int, last: int
 ) -> None:
-    """Put both halves of a piece on the stack, with the pairs to check on them.
-
-    The first half goes on top, so that what is certified grows from the begin.
-    """
+    """Append both halves of a piece to those to certify, with the pairs to check on them."""
     span, stretch, middle = work.span, work.stretch, 0.5 * (begin + end)
-    span[top, 0], span[top, 1] = middle, end
-    span[top + 1, 0], span[top + 1, 1] = begin, middle
+    span[top, 0], span[top, 1] = begin, middle
+    span[top + 1, 0], span[top + 1, 1] = middle, end
     for n in range(2):
         stretch[top + n, 0], stretch[top + n, 1] = first, last
 
 
 @inner
 def _uncertified(
-    scene: MotionScene, work: MotionWorkspace, begin: float, end: float, first: int, last: int
+    scene: MotionScene,
+    work: MotionWorkspace,
+    begin: float,
+    end: float,
+    first: int,
+    last: int,
+    to: int,
 ) -> int:
     """Certify pairs on a piece of the curve, and list those that are not certified.
 
     Args:
         scene: The scene.
         work: Holds the curve; `pairs[first:last]` are the pairs to check. Those not certified are
-            listed from `pairs[last]` on.
+            listed from `pairs[to]` on.
         begin: Begin of the piece, in [0, 1].
         end: End of the piece.
         first: First pair.
         last: One after the last pair.
+        to: Where the list begins.
 
     Returns:
         Number of pairs not certified, or -1 where one is in contact, or moves less than RESOLUTION.
@@ -250,9 +287,9 @@ def _uncertified(
         k = work.pairs[n]
         if not is_near_on_piece(scene, work, k):
             continue
-        moved, before = work.motion[scene.pair[k, 0], scene.pair[k, 2]], last + left
-        left = append_below(scene, work, k, moved, ROUNDING, before, len(work.pairs)) - last
-        for m in range(before, last + left):
+        moved, before = work.motion[scene.pair[k, 0], scene.pair[k, 2]], to + left
+        left = append_below(scene, work, k, moved, ROUNDING, before, len(work.pairs)) - to
+        for m in range(before, to + left):
             k = work.pairs[m]
             if is_of_groups(scene, k):
                 continue

@@ -6,7 +6,9 @@ far its shapes move on the piece.
 The bound: with the joints changed one after the other, from the last to the first, a point at
 distance d from the axis of joint k moves by at most `delta_k d` when that joint turns; and its
 distance from the axis has grown by no more than the motion before (Schwarzer, Saha, Latombe 2005
-bound the motion of all postures at once, which is looser).
+bound the motion of all postures at once, which is looser). Where the twist of the link at the
+middle posture is known, and what it leaves, `planes`, the motion from there is bounded by their sum
+too.
 """
 
 from __future__ import annotations
@@ -16,8 +18,9 @@ import numpy as np
 from tcs.kernel.arrays import BOX, CAPSULE, FloatArray
 from tcs.kernel.cache import inner
 from tcs.kernel.collide import BOUND, CENTRE, ROTATION, SIZE, TYPE, closer, move, spheres_overlap
+from tcs.kernel.distances import distance_bound
 from tcs.kernel.kinematics import link_poses
-from tcs.kernel.motion.planes import plane_between
+from tcs.kernel.motion.planes import TWISTED, plane_between
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
 
 COARSE = 0.02
@@ -40,6 +43,10 @@ def place_shape(scene: MotionScene, work: MotionWorkspace, i: int) -> None:
     work.placed[i] = work.posture[0]
     frame, shapes = scene.link_frame[i], work.shapes
     move(work.link_R[frame], work.link_p[frame], scene.links, i, shapes, i)
+    if work.posture[1] == 0:
+        for k in range(frame + 1):
+            work.motion[i, k] = 0.0
+        return
     # The two cap centres of a capsule; one centre for others.
     half, radius = 0.0, shapes[i, BOUND]
     if shapes[i, TYPE] == CAPSULE:
@@ -67,6 +74,23 @@ def place_shape(scene: MotionScene, work: MotionWorkspace, i: int) -> None:
             second += (angle * (2.0 * total + angle * away) + work.bend[k - 1] * away) * GROWN
             total += angle * away * GROWN
         work.motion[i, k - 1], work.rest[i, k - 1] = total, 0.5 * second
+    if work.posture[1] == TWISTED:
+        work.motion[i, 0] = min(total, _motion_of_twist(work, i, frame) + work.rest[i, 0])
+
+
+@inner
+def _motion_of_twist(work: MotionWorkspace, i: int, frame: int) -> float:
+    """Return a bound on the motion of any point of shape i by the twist of its link [m]."""
+    shapes, twist = work.shapes, work.twist
+    wx, wy, wz = twist[frame, 0], twist[frame, 1], twist[frame, 2]
+    x, y, z = shapes[i, CENTRE], shapes[i, CENTRE + 1], shapes[i, CENTRE + 2]
+    vx, vy, vz = (
+        wy * z - wz * y + twist[frame, 3],
+        wz * x - wx * z + twist[frame, 4],
+        wx * y - wy * x + twist[frame, 5],
+    )
+    moved = np.sqrt(vx * vx + vy * vy + vz * vz)
+    return (moved + np.sqrt(wx * wx + wy * wy + wz * wz) * shapes[i, BOUND]) * GROWN
 
 
 @inner
@@ -101,6 +125,10 @@ def _radius_about(shapes: FloatArray, i: int, R: FloatArray) -> float:
 def take_posture(scene: MotionScene, work: MotionWorkspace) -> None:
     """Make `work.q` the current posture: shapes are placed anew when next used."""
     work.posture[0] += 1
+    work.posture[1] = 0
+    for k in range(7):
+        if work.delta[k] > 0.0:
+            work.posture[1] = 1
     link_poses(scene.chain_R, scene.chain_p, work.q, work.link_R, work.link_p)
 
 
@@ -115,7 +143,9 @@ def is_near(scene: MotionScene, work: MotionWorkspace, k: int, grown: bool) -> b
     if base > 0:
         place_shape(scene, work, j)
     moved = work.motion[i, base] + ROUNDING if grown else 0.0
-    return _may_touch(work.shapes, i, j, scene.gap[k] + moved, moved)
+    return _may_touch(work.shapes, i, j, scene.gap[k] + moved, moved) and not _table_clears(
+        scene, work, k, scene.gap[k], grown
+    )
 
 
 @inner
@@ -288,12 +318,50 @@ def _may_touch_on_piece(
     Its shapes are placed; they move by at most `moved` [m] relative to each other.
     """
     i, j, base = scene.pair[k, 0], scene.pair[k, 1], scene.pair[k, 2]
-    within = scene.gap[k] + extra
-    if is_of_groups(scene, k):
-        near = _groups_may_touch(work.shapes, i, j, within + moved)
-    else:
-        near = _may_touch(work.shapes, i, j, within + moved, moved)
-    return near and not (moved > 0.0 and plane_between(scene, work, i, j, base, within))
+    shapes, within, of_groups = work.shapes, scene.gap[k] + extra, is_of_groups(scene, k)
+    if moved == 0.0:
+        if of_groups:
+            return _groups_may_touch(shapes, i, j, within)
+        near = _may_touch(shapes, i, j, within, moved)
+        return near and not _table_clears(scene, work, k, within, False)
+    far = within + moved
+    if not spheres_overlap(shapes, i, shapes, j, far) or not _sphere_near(shapes, i, j, far):
+        return False
+    if plane_between(scene, work, i, j, base, within, far, not of_groups):
+        return False
+    if of_groups:
+        return True
+    # Near two corners, boxes are farther apart than any plane tells.
+    near = moved > COARSE or closer(shapes, i, shapes, j, far)
+    return near and not _table_clears(scene, work, k, within, True)
+
+
+@inner
+def _table_clears(
+    scene: MotionScene, work: MotionWorkspace, k: int, within: float, grown: bool
+) -> bool:
+    """Return whether a table shows that the bodies of a pair of shapes keep a distance.
+
+    Args:
+        scene: The scene.
+        work: Scratch, with the current posture.
+        k: The pair, of shapes.
+        within: The distance [m].
+        grown: Whether they keep it wherever no joint is farther from the posture than `delta`.
+    """
+    first = scene.body[scene.pair[k, 0]] - scene.robot
+    second = scene.body[scene.pair[k, 1]] - scene.robot
+    if second < 0:
+        return False
+    distances = scene.distances
+    n = distances.of_bodies[first, second]
+    if n < 0:
+        return False
+    least = distance_bound(distances, n, work.q)
+    if grown:
+        for m in range(2):
+            least -= distances.reach[n, m] * work.delta[distances.joint[n, m]] * GROWN
+    return least >= within
 
 
 @inner

@@ -8,6 +8,7 @@ import numpy as np
 
 from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
 from tcs.kernel.collide import BOUND, CENTRE, COLUMNS, ROTATION
+from tcs.kernel.distances import DistanceTables
 from tcs.kernel.problem import Problem
 
 FULL_TURN = 2.0 * np.pi
@@ -17,6 +18,10 @@ MOST_PIECES = 16
 """Greatest number of pieces of a curve, a power of two."""
 DEPTH = 40
 """Greatest number of halvings of a curve: 2^-40 of any motion is below RESOLUTION of `edges`."""
+WIDE = 256
+"""Greatest number of pieces of a curve that are certified level by level."""
+LISTED = 8192
+"""Greatest number of pairs that are listed for all of them: depth first, lists take less."""
 
 
 class MotionScene(NamedTuple):
@@ -70,6 +75,10 @@ class MotionScene(NamedTuple):
     body: IntArray
     """Body of each shape, shape (n_arm + n_fixed,): index among the bodies of the environment, or
     that of a robot body plus the number of bodies of the environment."""
+    distances: DistanceTables
+    """Tables of distances of bodies of the robot."""
+    robot: int
+    """Number of the first body of the robot in `body`."""
 
 
 class MotionWorkspace(NamedTuple):
@@ -86,7 +95,8 @@ class MotionWorkspace(NamedTuple):
     placed: IntArray
     """Number of the posture for which each shape of the arm was placed, shape (n_arm,)."""
     posture: IntArray
-    """Number of the current posture, shape (1,)."""
+    """Number of the current posture, and 1 if joints move on the current piece, `planes.TWISTED`
+    if their motion to first order is known too; shape (2,)."""
     delta: FloatArray
     """Greatest distance of each joint from the current posture on the current piece [rad],
     shape (7,)."""
@@ -110,13 +120,13 @@ class MotionWorkspace(NamedTuple):
     met: FloatArray
     """Where on the curve the pair `contact` blocks it, in [0, 1], shape (1,)."""
     pairs: IntArray
-    """Stack of lists of pairs that are not certified yet, shape (DEPTH * n_pairs,)."""
+    """Lists of pairs that are not certified yet, shape (LISTED + (DEPTH + 2) * n_pairs,)."""
     stack: IntArray
     """Stack of pairs whose pairs below are checked next, shape (STACK,)."""
     span: FloatArray
-    """Stack of pieces of the curve: begin and end, in [0, 1], shape (2 * DEPTH, 2)."""
+    """Pieces of the curve to certify: begin and end, in [0, 1], shape (WIDE + 2 * DEPTH, 2)."""
     stretch: IntArray
-    """First pair and one after the last pair of each piece in `span`, shape (2 * DEPTH, 2)."""
+    """First pair and one after the last pair of each piece in `span`, shape as `span`."""
     contact: IntArray
     """The pair found in contact last, -1 for none, shape (1,)."""
     hits: IntArray
@@ -185,6 +195,8 @@ def torso_scene(problem: Problem, torso: int) -> MotionScene:
                 problem.body_body + problem.environment_bodies,
             ]
         ),
+        distances=problem.distances,
+        robot=problem.environment_bodies,
         **pair_fields(links, fixed, pair[order].astype(np.int64), gap[order]),
     )
 
@@ -279,7 +291,7 @@ def new_motion_workspace(scene: MotionScene) -> MotionWorkspace:
         link_p=np.empty((8, 3)),
         shapes=shapes,
         placed=np.zeros(arm, np.int64),
-        posture=np.zeros(1, np.int64),
+        posture=np.zeros(2, np.int64),
         delta=np.zeros(7),
         motion=np.zeros((arm, 8)),
         rest=np.zeros((arm, 8)),
@@ -289,10 +301,10 @@ def new_motion_workspace(scene: MotionScene) -> MotionWorkspace:
         control=np.empty((3 * MOST_PIECES + 1, 7)),
         pieces=np.ones(1, np.int64),
         met=np.zeros(1),
-        pairs=np.empty((DEPTH + 1) * pairs, np.int64),
+        pairs=np.empty(LISTED + (DEPTH + 2) * pairs, np.int64),
         stack=np.empty(STACK, np.int64),
-        span=np.empty((2 * DEPTH, 2)),
-        stretch=np.empty((2 * DEPTH, 2), np.int64),
+        span=np.empty((WIDE + 2 * DEPTH, 2)),
+        stretch=np.empty((WIDE + 2 * DEPTH, 2), np.int64),
         contact=np.full(1, -1, np.int64),
         hits=np.zeros(pairs, np.int64),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, jit
-from tcs.kernel.motion.edges import edge_is_certified, edge_is_free
+from tcs.kernel.motion.edges import edge_is_certified, edge_seems_free
 from tcs.kernel.motion.random import uniform
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
 from tcs.kernel.motion.trees import MOST_POINTS, Trees, distance, edge_length, unwound
@@ -24,15 +24,20 @@ def shorten(
 ) -> int:
     """Shorten `path` in place, see `cut_corners`; returns the number of its postures."""
     scene, work, trees = unowned(owned_scene), unowned(owned_work), unowned(owned_trees)
-    count = drop_postures(scene, work, trees, count)
-    return cut_corners(scene, work, trees, count, attempts)
+    count = drop_postures(scene, work, trees, count, True)
+    return cut_corners(scene, work, trees, count, attempts, True)
 
 
 @inner
 def cut_corners(
-    scene: MotionScene, work: MotionWorkspace, trees: Trees, count: int, attempts: int
+    scene: MotionScene,
+    work: MotionWorkspace,
+    trees: Trees,
+    count: int,
+    attempts: int,
+    certify: bool,
 ) -> int:
-    """Shorten `path` in place; its ends stay up to full turns, and new edges are certified.
+    """Shorten `path` in place; its ends stay up to full turns.
 
     Args:
         scene: The scene.
@@ -40,6 +45,7 @@ def cut_corners(
         trees: Holds path and random state.
         count: Number of postures of the path.
         attempts: Number of random shortcuts to try; postures are dropped after them.
+        certify: Whether new edges are certified, or only checked at postures.
 
     Returns:
         Number of postures of the shorter path.
@@ -47,8 +53,8 @@ def cut_corners(
     for _ in range(attempts):
         if count < 3 or count + 2 > MOST_POINTS:
             break
-        count = _cut(scene, work, trees, count)
-    return drop_postures(scene, work, trees, count) if attempts > 0 else count
+        count = _cut(scene, work, trees, count, certify)
+    return drop_postures(scene, work, trees, count, certify) if attempts > 0 else count
 
 
 @inner
@@ -68,11 +74,17 @@ def _edge_is_free(
     trees: Trees,
     start: FloatArray,
     end: FloatArray,
+    certify: bool,
 ) -> bool:
-    """Return whether the edge to a posture, the short way round, is free; fills `trees.turned`."""
+    """Return whether the edge to a posture, the short way round, is free; fills `trees.turned`.
+
+    Without `certify` it is checked at postures only.
+    """
     for k in range(7):
         trees.turned[k] = unwound(scene, start[k], end[k], k)
-    return edge_is_free(scene, work, start, trees.turned)
+    return edge_seems_free(scene, work, start, trees.turned) and (
+        not certify or edge_is_certified(scene, work, start, trees.turned)
+    )
 
 
 @inner
@@ -86,15 +98,33 @@ def _turn(path: FloatArray, first: int, count: int, before: FloatArray, after: F
 
 
 @inner
-def drop_postures(scene: MotionScene, work: MotionWorkspace, trees: Trees, count: int) -> int:
-    """Drop postures between which an edge is free, the longest runs first; return how many stay."""
+def drop_postures(
+    scene: MotionScene, work: MotionWorkspace, trees: Trees, count: int, certify: bool
+) -> int:
+    """Drop postures between which an edge is free, long runs first; return how many stay.
+
+    The end of a run is found by halving: where an edge is blocked, longer ones seldom are free.
+
+    Args:
+        scene: The scene.
+        work: Scratch.
+        trees: Holds the path.
+        count: Number of postures of the path.
+        certify: Whether new edges are certified, or only checked at postures.
+    """
     path, begin = trees.path, 0
     while begin < count - 2:
-        end = count - 1
-        while end > begin + 1 and not _edge_is_free(scene, work, trees, path[begin], path[end]):
-            end -= 1
+        end, blocked, trial = begin + 1, count, count - 1
+        while trial > end:
+            if _edge_is_free(scene, work, trees, path[begin], path[trial], certify):
+                end = trial
+            else:
+                blocked = trial
+            trial = (end + blocked) // 2
         dropped = end - begin - 1
         if dropped > 0:
+            for k in range(7):
+                trees.turned[k] = unwound(scene, path[begin, k], path[end, k], k)
             _turn(path, end + 1, count, path[end], trees.turned)
             for k in range(7):
                 path[end, k] = trees.turned[k]
@@ -107,7 +137,7 @@ def drop_postures(scene: MotionScene, work: MotionWorkspace, trees: Trees, count
 
 
 @inner
-def _cut(scene: MotionScene, work: MotionWorkspace, trees: Trees, count: int) -> int:
+def _cut(scene: MotionScene, work: MotionWorkspace, trees: Trees, count: int, certify: bool) -> int:
     """Try one shortcut between two random points of the path; return the number of postures."""
     path, ends, spare = trees.path, trees.target, trees.spare
     total = 0.0
@@ -118,7 +148,7 @@ def _cut(scene: MotionScene, work: MotionWorkspace, trees: Trees, count: int) ->
     m, n = _take_point(path, count, early, ends[0]), _take_point(path, count, late, ends[1])
     if m == n or distance(scene, ends[0], ends[1]) > (1.0 - LEAST_GAIN) * (late - early):
         return count
-    if not _edge_is_free(scene, work, trees, ends[0], ends[1]):
+    if not _edge_is_free(scene, work, trees, ends[0], ends[1], certify):
         return count
     _turn(path, n + 1, count, ends[1], trees.turned)
     kept = count - (n + 1)

@@ -9,7 +9,7 @@ import numpy as np
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant, jit
 from tcs.kernel.kinematics import fill_jacobian, link_poses, place_tool, pose_error
-from tcs.kernel.motion.edges import curve_is_free_until
+from tcs.kernel.motion.edges import curve_is_free
 from tcs.kernel.motion.scene import MOST_PIECES, MotionScene, MotionWorkspace
 from tcs.kernel.numeric.newton import (
     NewtonWorkspace,
@@ -125,7 +125,7 @@ def straight_motion(
         while count > last - first:
             count //= 2
         take_pieces(work, points, tangents, first, count)
-        if curve_is_free_until(scene, work) < 1.0:
+        if not curve_is_free(scene, work, False):
             return BLOCKED
         first += count
     return DONE
@@ -174,21 +174,28 @@ def error_between(
         line.q[k] = 0.125 * (c[0, k] + c[3, k]) + 0.375 * (c[1, k] + c[2, k])
     for r in range(3):
         line.target[r] = line.p_AT[r] + fraction * offset[r]
-    return evaluate_on_line(scene, line, line.q)
+    return _error_on_line(scene, line, line.q)
+
+
+@inner
+def _error_on_line(scene: MotionScene, line: StraightWorkspace, q: FloatArray) -> float:
+    """Fill link poses and pose error at joint angles q; return the error [rad and m]."""
+    newton = line.newton
+    link_poses(scene.chain_R, scene.chain_p, q, newton.link_R, newton.link_p)
+    place_tool(scene.chain_R, scene.chain_p, newton.link_R, newton.link_p, newton.R_AT, newton.p_AT)
+    return pose_error(newton.R_AT, newton.p_AT, line.R_AT, line.target, newton.error)
 
 
 @inner
 def evaluate_on_line(scene: MotionScene, line: StraightWorkspace, q: FloatArray) -> float:
     """Fill pose error and Jacobian at joint angles q, with the columns of locked joints at 0."""
-    newton = line.newton
-    link_poses(scene.chain_R, scene.chain_p, q, newton.link_R, newton.link_p)
-    place_tool(scene.chain_R, scene.chain_p, newton.link_R, newton.link_p, newton.R_AT, newton.p_AT)
+    newton, error = line.newton, _error_on_line(scene, line, q)
     fill_jacobian(newton.link_R, newton.link_p, newton.p_AT, newton.J)
     for k in range(7):
         if line.locked[k] == 1:
             for i in range(6):
                 newton.J[i, k] = 0.0
-    return pose_error(newton.R_AT, newton.p_AT, line.R_AT, line.target, newton.error)
+    return error
 
 
 @inner

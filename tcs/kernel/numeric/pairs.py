@@ -178,13 +178,12 @@ def bisect_contacts(
         for _ in range(BISECTIONS):
             middle = 0.5 * (low + high)
             point = int(middle)
-            point_between(search.curves, point, middle - point, search.curves.q_now)
-            link_poses(
-                problem.chain_R, problem.chain_p, search.curves.q_now, work.link_R, work.link_p
-            )
-            if pair_touches(problem, work, body_A, partner, i, j):
+            q = search.curves.q_now
+            point_between(search.curves, point, middle - point, q)
+            link_poses(problem.chain_R, problem.chain_p, q, work.link_R, work.link_p)
+            if pair_touches(problem, work, body_A, q, partner, i, j):
                 low = middle
-            elif pair_touches(problem, work, body_A, other, k, m):
+            elif pair_touches(problem, work, body_A, q, other, k, m):
                 high = middle
             else:
                 contact = contact_at(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tcs.errors import ArmClassError
 from tcs.kernel.arrays import FloatArray, IntArray, SceneArrays
 from tcs.kernel.base_pose import environment_in_arm_base, place_base, pose_in_arm_base
 from tcs.kernel.cache import inner, jit
@@ -20,7 +21,7 @@ from tcs.kernel.contacts import (
     place_coupled_links,
 )
 from tcs.kernel.dexterity.measures import measure_at, rounded_inward
-from tcs.kernel.freedom.forms import pose_of
+from tcs.kernel.freedom.forms import FEWEST_JOINTS, pose_of
 from tcs.kernel.kinematics import link_poses
 from tcs.kernel.motion.postures import postures_at
 from tcs.kernel.problem import Problem, gaps_between
@@ -28,10 +29,9 @@ from tcs.kernel.six_joints.pairs import new_six_joint_solver
 from tcs.kernel.six_joints.solutions import MOST_SOLUTIONS, solve_six_joints, within_limits
 from tcs.kernel.views import unowned
 
-SAMPLES = 64
-"""Values of the free joint at which the postures of an arm are tried."""
 SAMPLES_OF_FREE_GOALS = 8
-"""The same at each sampled pose of a goal with freedom, which has dozens."""
+"""Least number of values of the free joint at each sampled pose of a goal with freedom, which has
+dozens."""
 
 
 class TwoArms:
@@ -44,7 +44,15 @@ class TwoArms:
             first: The problem of one arm, without the other.
             second: The problem of the other.
             scenes: Their scenes.
+
+        Raises:
+            ArmClassError: If an arm has five joints.
         """
+        if first.joints == FEWEST_JOINTS or second.joints == FEWEST_JOINTS:
+            raise ArmClassError(
+                "two arms at once need six or seven joints each, and one of them has five: leave "
+                "'together_with' out of the goals."
+            )
         self.problems = (first, second)
         self.works = (new_workspace(first), new_workspace(second))
         self.gaps = gaps_between(*scenes, first.link_first, second.link_first)
@@ -77,7 +85,7 @@ class TwoArms:
         configuration: int,
         goals: tuple[int, int],
         known: tuple[FloatArray, FloatArray],
-        samples: int = SAMPLES,
+        samples: int,
     ) -> tuple[float, FloatArray, FloatArray] | None:
         """Return the pair of free postures with the greatest lesser measure.
 
@@ -117,8 +125,8 @@ class TwoArms:
         R, p = problem.goal_R[state, goal], problem.goal_p[state, goal]
         offsets = np.zeros((1, 6))
         if free.first.size and np.any(free.form[goal]):
-            begin = free.first[goal]
-            offsets = free.u[begin : begin + free.samples[goal]]
+            begin = free.start[goal]
+            offsets = free.u[begin : begin + free.first[goal + 1] - free.first[goal]]
             samples = max(SAMPLES_OF_FREE_GOALS, samples // len(offsets))
         form = free.form[goal] if free.first.size else np.zeros(15)
         parts = [known] if len(known) else []

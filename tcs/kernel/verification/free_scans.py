@@ -8,10 +8,21 @@ from scipy.spatial.transform import Rotation
 
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.contacts import NO_CONTACT
-from tcs.kernel.freedom.forms import AXIS, FOLD, HALF, ROTATES, TILT, no_freedom
+from tcs.kernel.freedom.forms import (
+    AXIS,
+    COLUMNS,
+    FEWEST_JOINTS,
+    FOLD,
+    HALF,
+    PARAMETERS,
+    ROTATES,
+    TILT,
+)
+from tcs.kernel.freedom.goals import FreeGoals, no_freedom
 from tcs.kernel.problem import Problem
 from tcs.kernel.scores import Scores
 from tcs.kernel.sweep import gripper_contacts, score_slice
+from tcs.kernel.verification.five_joint_scans import five_joint_scan
 
 ANGLES = 360
 """Poses of a goal that is free to rotate about an axis: one every degree."""
@@ -59,6 +70,8 @@ def drawn_poses(form: FloatArray, seed: int = 0) -> tuple[FloatArray, FloatArray
 def at_poses(problem: Problem, state: int, goal: int) -> Problem:
     """Return a problem whose goals are the drawn poses of one goal, alike in every state.
 
+    They are single poses; an arm of five joints may rotate the tool about the axis at each.
+
     Args:
         problem: The problem.
         state: The environment state from which the goal is taken.
@@ -71,7 +84,23 @@ def at_poses(problem: Problem, state: int, goal: int) -> Problem:
     return problem._replace(
         goal_R=np.ascontiguousarray(np.repeat(R[None], states, axis=0)),
         goal_p=np.ascontiguousarray(np.repeat(p[None], states, axis=0)),
-        freedom=no_freedom(),
+        freedom=_turning(problem, len(R)) if problem.joints == FEWEST_JOINTS else no_freedom(),
+    )
+
+
+def _turning(problem: Problem, count: int) -> FreeGoals:
+    """Return the freedom of goals at which an arm of five joints finds the angle about the axis."""
+    form = np.zeros((count, COLUMNS + 6))
+    form[:, AXIS : AXIS + 3], form[:, FOLD] = problem.turn, 1.0
+    return no_freedom()._replace(
+        form=form,
+        step=np.zeros((count, PARAMETERS)),
+        first=np.arange(count + 1),
+        start=np.zeros(count, np.int64),
+        parents=np.zeros((1, 2), np.int64),
+        child_first=np.zeros(2, np.int64),
+        u=np.zeros((1, PARAMETERS)),
+        reach=problem.freedom.reach,
     )
 
 
@@ -82,7 +111,8 @@ def free_scans(
 
     The arguments are those of `dense_scans`; `samples` is divided by 8, because neighbouring poses
     have neighbouring solutions. An arm of six joints has all its solutions at each pose, those of
-    the closed form, which `six_joint_scans` checks without freedom.
+    the closed form, which `six_joint_scans` checks without freedom. So has an arm of five joints,
+    with the angle about the axis; where that alone is free, Newton's method finds them.
     """
     from tcs.kernel.verification.dense import dense_scans
 
@@ -90,8 +120,11 @@ def free_scans(
     places = problem.base_x.size * problem.base_y.size * problem.base_yaw.size
     for i, (configuration, goal) in enumerate(pairs):
         state = int(configuration) // (places * problem.torso_levels)
+        if problem.joints == FEWEST_JOINTS and not np.any(problem.freedom.step[goal]):
+            values[i] = five_joint_scan(problem, int(configuration), int(goal), joints[i])
+            continue
         posed = at_poses(problem, state, int(goal))
-        if problem.joints == 6:
+        if problem.joints < 7:
             values[i], joints[i] = _best_score(posed, int(configuration))
             continue
         clear = np.flatnonzero(gripper_contacts(posed)[state] == NO_CONTACT)

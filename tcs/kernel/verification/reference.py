@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from scipy.linalg import null_space
 
 from tcs.kernel.arrays import BOX, CAPSULE, Chain, FloatArray, Shapes
 from tcs.kernel.dexterity import ISOTROPY, LIMIT_WEIGHTED, NORMALISED, UNLIMITED, dexterity
@@ -81,9 +82,9 @@ def jacobian(chain: Chain, q: FloatArray) -> FloatArray:
 
 
 def isotropy(J: FloatArray) -> float:
-    """Return TCS eq. (2) with the sixth root: det(J J^T)^(1/6) / (trace(J J^T)/6)."""
-    G = J @ J.T
-    return max(float(np.linalg.det(G)), 0.0) ** (1 / 6) / (float(np.trace(G)) / 6)
+    """Return TCS eq. (2) with the m-th root, m rows: det(J J^T)^(1/m) / (trace(J J^T)/m)."""
+    G, m = J @ J.T, len(J)
+    return max(float(np.linalg.det(G)), 0.0) ** (1 / m) / (float(np.trace(G)) / m)
 
 
 def inverse_condition(J: FloatArray) -> float:
@@ -119,12 +120,24 @@ def limit_weight(q: float, lower: float, upper: float) -> float:
     return max(0.001, 1 - 0.5 ** ((R - abs(R - q + lower)) / (0.05 * R) + 1))
 
 
+def prescribed(J: FloatArray, axis: FloatArray) -> FloatArray:
+    """Return the rows of J that a goal prescribes which leaves a rotation free, shape (5, joints).
+
+    Args:
+        J: Shape (6, joints), rows [angular; linear].
+        axis: Unit axis of that rotation, in the frame of J, shape (3,).
+    """
+    across = null_space(axis[None])
+    return np.concatenate([across.T @ J[:3], J[3:]])
+
+
 def measured(
     J: FloatArray, q: FloatArray, lower: FloatArray, upper: FloatArray, measure: str
 ) -> float:
     """Return the dexterity measure of that name, ITCM thesis eq. (22) where it has a penalty.
 
     JLWKI is the isotropy of J with the column of each joint multiplied by the root of its weight.
+    J of an arm of five joints is `prescribed`.
     """
     of, penalty = dexterity(measure)
     if of == LIMIT_WEIGHTED:

@@ -13,7 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from tcs.kernel.arrays import FloatArray, GridArrays, SceneArrays
 from tcs.kernel.dexterity import DEFAULT_MEASURE
-from tcs.kernel.freedom.forms import AXIS, FOLD, HALF, ROTATES, TILT, FreeGoals
+from tcs.kernel.freedom.forms import AXIS, FOLD, HALF, ROTATES, TILT
+from tcs.kernel.freedom.goals import FreeGoals
 from tcs.kernel.scores import REACHED
 from tcs.kernel.verification.reference import Pose, compose, inverse, link_poses
 from tcs.kernel.verification.reference_pairs import Verdict, placed_scene, score
@@ -40,9 +41,13 @@ def free_score(
     If no sample reaches the goal, the verdict is that of the last sample.
     """
     best = None
-    for n in range(free.first[goal], free.first[goal] + free.samples[goal]):
+    for n in range(free.first[goal + 1] - free.first[goal]):
         verdict = score(
-            at_offset(scene, goal, offset(free.form[goal], free.u[n])), grid, h, goal, measure
+            at_offset(scene, goal, offset(free.form[goal], free.u[free.start[goal] + n])),
+            grid,
+            h,
+            goal,
+            measure,
         )
         is_better = verdict.reason == REACHED and (
             best is None or best.reason != REACHED or verdict.dexterity > best.dexterity
@@ -54,11 +59,15 @@ def free_score(
 
 
 def at_offset(scene: SceneArrays, goal: int, X_GT: Pose) -> SceneArrays:
-    """Return the scene with one goal moved by X_GT, and nothing free."""
+    """Return the scene with one goal moved by X_GT, and nothing free.
+
+    An arm of five joints keeps the freedom, of which it needs the rotation.
+    """
     R, p = scene.goal_R.copy(), scene.goal_p.copy()
     for state in range(len(R)):
         R[state, goal], p[state, goal] = compose((R[state, goal], p[state, goal]), X_GT)
-    return scene._replace(goal_R=R, goal_p=p, freedom=scene.freedom[:0])
+    freedom = scene.freedom if scene.chain.joints == 5 else scene.freedom[:0]
+    return scene._replace(goal_R=R, goal_p=p, freedom=freedom)
 
 
 def is_served(scene: SceneArrays, grid: GridArrays, h: int, goal: int, q: FloatArray) -> bool:

@@ -14,6 +14,7 @@ import numpy as np
 
 from tcs.kernel.arrays import Chain, FloatArray, Shapes
 from tcs.kernel.verification.reference import PlacedShape, distance
+from tcs.kernel.verification.reference_distances import bounds_at
 from tcs.kernel.verification.reference_pairs import PlacedScene
 
 FAR = 0.05
@@ -25,17 +26,26 @@ def checked_pairs(
 ) -> Iterator[tuple[PlacedShape, PlacedShape, float]]:
     """Yield the pairs of shapes to check at joint angles q, with the distance to keep [m]."""
     arm, scene = placed.arm_at(q), placed.scene
+    bounds = bounds_at(scene.distances, q)
+
+    def is_apart(a: PlacedShape, b: PlacedShape, required: float) -> bool:
+        return bounds.get(frozenset((a.body, b.body)), -math.inf) >= required
+
     for i, shape in enumerate(arm):
         for others, checked, margin in (
             (placed.environment, scene.arm_vs_environment, scene.margin),
             (placed.body, scene.arm_vs_body, scene.self_margin),
         ):
             for j, other in enumerate(others):
-                if checked[i, j]:
-                    yield shape, other, max(margin, shape.pad + other.pad)
+                required = max(margin, shape.pad + other.pad)
+                own = others is placed.body
+                if checked[i, j] and not (own and is_apart(shape, other, required)):
+                    yield shape, other, required
         for j in range(i):
             if scene.arm_vs_arm[i, j] and scene.arm.frame[i] != scene.arm.frame[j]:
-                yield shape, arm[j], max(scene.self_margin, shape.pad + arm[j].pad)
+                required = max(scene.self_margin, shape.pad + arm[j].pad)
+                if not is_apart(shape, arm[j], required):
+                    yield shape, arm[j], required
 
 
 def least_excess(placed: PlacedScene, q: FloatArray) -> float:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +19,8 @@ import numpy as np
 from tcs.kernel.analytic.pairs import REFINE_SAMPLES, REFINEMENTS
 from tcs.kernel.arrays import BoolArray, FloatArray, GridArrays, SceneArrays
 from tcs.kernel.dexterity import DEFAULT_MEASURE
+from tcs.kernel.five_joints.turned import turned_chain
+from tcs.kernel.freedom.forms import AXIS
 from tcs.kernel.scores import (
     ARM_BLOCKED,
     BODY_BLOCKED,
@@ -40,6 +42,7 @@ from tcs.kernel.verification.reference import (
     jacobian,
     link_poses,
     measured,
+    prescribed,
     rot_z,
     separation,
     shapes_of,
@@ -51,6 +54,7 @@ from tcs.kernel.verification.reference_candidates import (
     fast_candidates,
     find_candidates,
 )
+from tcs.kernel.verification.reference_distances import bounds_at
 
 
 @dataclass(frozen=True)
@@ -68,6 +72,7 @@ class Verdict:
     that rounding decides."""
 
 
+NO_BOUNDS: Mapping[frozenset[int], float] = {}
 FAR = 0.01
 """Least distance of two shapes beyond the required one [m] at which it is not computed."""
 
@@ -82,13 +87,20 @@ class PlacedScene:
     X_AG: Pose
     clearance: float = math.inf
 
-    def touches(self, a: PlacedShape, b: PlacedShape, margin: float) -> bool:
+    def touches(
+        self,
+        a: PlacedShape,
+        b: PlacedShape,
+        margin: float,
+        bounds: Mapping[frozenset[int], float] = NO_BOUNDS,
+    ) -> bool:
         """Return whether two shapes collide, and update `clearance`.
 
         Args:
             a: One shape.
             b: The other.
             margin: Distance that they must keep without paddings [m].
+            bounds: Lower bounds of the distance of bodies, for two shapes of the robot [m].
         """
         required = max(margin, a.pad + b.pad)
         # Bounding spheres well apart make the exact distance unnecessary.
@@ -98,11 +110,17 @@ class PlacedScene:
         if separation(a, b) - a.radius - b.radius > required + FAR:
             return False
         excess = distance(a, b) - required
+        excess = max(excess, bounds.get(frozenset((a.body, b.body)), -math.inf) - required)
         self.clearance = min(self.clearance, abs(excess))
         return excess < 0.0
 
     def any_touch(
-        self, first: list[PlacedShape], others: list[PlacedShape], checked: BoolArray, margin: float
+        self,
+        first: list[PlacedShape],
+        others: list[PlacedShape],
+        checked: BoolArray,
+        margin: float,
+        bounds: Mapping[frozenset[int], float] = NO_BOUNDS,
     ) -> bool:
         """Return whether any checked pair of shapes collides.
 
@@ -111,6 +129,7 @@ class PlacedScene:
             others: m shapes.
             checked: Whether each pair is checked, shape (n, m).
             margin: Distance that they must keep without paddings [m].
+            bounds: As for `touches`.
         """
         if not (first and others):
             return False
@@ -120,7 +139,7 @@ class PlacedScene:
             np.linalg.norm(p - q, axis=2) - sphere - reach <= np.maximum(margin, pad + more) + FAR
         )
         pairs = np.argwhere(near & checked)
-        return any(self.touches(first[i], others[j], margin) for i, j in pairs)
+        return any(self.touches(first[i], others[j], margin, bounds) for i, j in pairs)
 
     def arm_at(self, q: FloatArray) -> list[PlacedShape]:
         """Return the arm's shapes in A at joint angles q [rad]."""
@@ -150,10 +169,11 @@ class PlacedScene:
         free = scene.arm.frame != 7
         links = list(itertools.compress(arm, free))
         once = np.tril(scene.arm_vs_arm, -1) & (free[:, None] | free[None])
+        bounds = bounds_at(scene.distances, q)
         return (
             self.any_touch(links, self.environment, scene.arm_vs_environment[free], scene.margin)
-            or self.any_touch(links, self.body, scene.arm_vs_body[free], scene.self_margin)
-            or self.any_touch(arm, arm, once, scene.self_margin)
+            or self.any_touch(links, self.body, scene.arm_vs_body[free], scene.self_margin, bounds)
+            or self.any_touch(arm, arm, once, scene.self_margin, bounds)
         )
 
 
@@ -201,9 +221,11 @@ def score(
 
     if blocked:
         return verdict(BODY_BLOCKED)
+    chain = scene.chain
+    if chain.joints == 5:
+        return _five_joint_score(placed, goal, measure)
     if placed.gripper_touches(with_body=False):
         return verdict(GRIPPER_BLOCKED_BY_ENVIRONMENT)
-    chain = scene.chain
     if chain.joints == 6:
         return _six_joint_score(placed, measure)
     arcs, possible = elbow_arcs(chain, placed.X_AG)
@@ -252,6 +274,39 @@ def _six_joint_score(placed: PlacedScene, measure: str) -> Verdict:
     if contact_free is None:
         return Verdict(ARM_BLOCKED, clearance=placed.clearance)
     return Verdict(REACHED, value(contact_free), contact_free, placed.clearance)
+
+
+def _five_joint_score(placed: PlacedScene, goal: int, measure: str) -> Verdict:
+    """Return the result at a goal that is free about an axis, for an arm of five joints.
+
+    Newton's method solves the arm with that rotation as its sixth joint.
+    """
+    chain, axis = placed.scene.chain, placed.scene.freedom[goal, AXIS : AXIS + 3]
+    turned = turned_chain(chain, axis)
+    solutions = newton_solutions(turned, *placed.X_AG)
+    if not len(solutions):
+        return Verdict(TOO_FAR, clearance=placed.clearance)
+    found = within(turned, solutions)
+    if not len(found):
+        return Verdict(JOINT_LIMITS, clearance=placed.clearance)
+    postures = np.concatenate([np.zeros((len(found), 2)), found[:, 1:6]], axis=1)
+
+    def value(q: FloatArray) -> float:
+        J = prescribed(jacobian(chain, q), link_poses(chain, q)[-1][0] @ axis)
+        return measured(J, q, chain.lower, chain.upper, measure)
+
+    reasons = []
+    for q in sorted(postures, key=value, reverse=True):
+        placed.X_AG = link_poses(chain, q)[-1]
+        if placed.gripper_touches(with_body=False):
+            reasons.append(GRIPPER_BLOCKED_BY_ENVIRONMENT)
+        elif placed.gripper_touches(with_body=True):
+            reasons.append(GRIPPER_BLOCKED_BY_ROBOT)
+        elif placed.arm_touches(q):
+            reasons.append(ARM_BLOCKED)
+        else:
+            return Verdict(REACHED, value(q), q, placed.clearance)
+    return Verdict(reasons[0], clearance=placed.clearance)
 
 
 def confirms(scene: SceneArrays, grid: GridArrays, h: int, goal: int, q: FloatArray) -> bool:
