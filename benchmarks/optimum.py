@@ -1,7 +1,7 @@
 """Measure what lies between the grid points: refined sets, their bound, and CMA-ES as a baseline.
 
 Usage: python benchmarks/optimum.py [--rows TASK/ENVIRONMENT ...] [--measure isotropy]
-           [--seeds 20] [--samples 1000] [--processes 2]
+           [--seeds 20] [--samples 1000] [--processes 2] [--total]
 
 Each row of Table I is scored, on the bed with the person at the nominal position, and refined by
 P_R + P_M, once among the sets that are as sure under error as the best of the grid (the default)
@@ -13,8 +13,9 @@ favourable state of the environment.
 
 CMA-ES (benchmarks/cma_baseline.py) searches the same space for two members, for the time that
 scoring and the refinement among all sets took: it knows no error. Times are processor times, of one
-process with one thread; rows are shared among processes. `--seeds 0` leaves CMA-ES out. With
-`--save`, the saved rows that a run does not measure are kept: `--rows` renews some of them.
+process with one thread; rows are shared among processes. `--seeds 0` leaves CMA-ES out, `--total`
+all but the wall time of all refinements. With `--save`, the saved rows that a run does not measure
+are kept: `--rows` renews some of them.
 """
 
 from __future__ import annotations
@@ -70,6 +71,7 @@ def main() -> None:
     command_line.add_argument("--seeds", type=int, default=20)
     command_line.add_argument("--samples", type=int, default=1000)
     command_line.add_argument("--processes", type=int, default=2)
+    command_line.add_argument("--total", action="store_true")
     options = command_line.parse_args()
     header("cma")
     names = options.rows or ["/".join(pair) for pair in task_environment_pairs(None)]
@@ -87,6 +89,9 @@ def main() -> None:
         if not options.rows:
             cells = str(len(names)), str(options.processes), f"{time.perf_counter() - begun:.1f}"
             record("total", ("rows", "processes", "wall time [s]"), [cells])
+            save(options, keep=True)
+        if options.total:
+            return
         rows, surest, ours = [], [], {}
         print(" | ".join(COLUMNS))
         for found in pool.map(partial(judged_row, place, options), names):

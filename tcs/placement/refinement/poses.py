@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
@@ -23,7 +24,7 @@ from tcs.placement.scoring.sweep import warm_up
 from tcs.placement.tables import Points, Reason
 
 BATCH = 64
-"""Base poses that a thread scores at a time."""
+"""Most base poses that a thread scores at a time."""
 SINGLE = {"start": 0.0, "step": 0.0, "count": 1}
 
 
@@ -59,10 +60,10 @@ class PoseScorer:
         grippers = np.ascontiguousarray(self.grippers[:, chosen])
         return type(self)(problem, grippers, self.grid, self.jobs)
 
-    def at(self, values: FloatArray) -> Problem:
-        """Return the problem at a base pose, given by the values of the grid's axes."""
+    def at(self, base: FloatArray) -> Problem:
+        """Return the problem at base poses that differ in x alone, shape (n, 3): x, y, yaw."""
         return self.problem._replace(
-            base_x=values[:1].copy(), base_y=values[1:2].copy(), base_yaw=values[2:3].copy()
+            base_x=base[:, 0].copy(), base_y=base[:1, 1].copy(), base_yaw=base[:1, 2].copy()
         )
 
     def score(self, points: Points) -> PointScores:
@@ -75,20 +76,30 @@ class PoseScorer:
             joints=np.zeros((*shape, 7), np.float32),
         )
 
-        def score_batch(start: int) -> None:
-            for i in range(start, min(start + BATCH, shape[0])):
-                row = slice(i, i + 1)
-                part = Scores(
-                    found.reason[row], found.contact[row], found.dexterity[row], found.joints[row]
-                )
-                score_slice(self.at(points.values[i]), self.grippers, 0, 1, part)
+        # Base poses that differ in x alone are configurations of one problem: sorted by the others,
+        # they follow each other.
+        base = points.values[:, :3]
+        order = np.lexsort(base.T)
+        apart = np.any(np.diff(base[order, 1:], axis=0) != 0.0, axis=1)
+        first = np.union1d(np.flatnonzero(np.r_[True, apart]), np.arange(0, shape[0], BATCH))
+
+        def score_batch(start: int, stop: int) -> None:
+            rows = order[start:stop]
+            part = Scores(
+                found.reason[start:stop],
+                found.contact[start:stop],
+                found.dexterity[start:stop],
+                found.joints[start:stop],
+            )
+            score_slice(self.at(base[rows]), self.grippers, 0, len(rows), part)
 
         Parallel(n_jobs=self.jobs, prefer="threads")(
-            delayed(score_batch)(start) for start in range(0, shape[0], BATCH)
+            delayed(score_batch)(*ends) for ends in itertools.pairwise([*first, shape[0]])
         )
         reached = found.reason == Reason.REACHED
         found.dexterity[~reached], found.joints[~reached] = 0.0, 0.0
-        return PointScores(reached, found.dexterity, found.joints)
+        back = np.argsort(order)
+        return PointScores(reached[back], found.dexterity[back], found.joints[back])
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.kernel.verification.reference import measured
-from tcs.model.scene import Scene, goal_poses
+from tcs.kernel.verification.reference import measured, prescribed
+from tcs.model.scene import Scene, arm_chain, axis_of_turn, goal_poses
 from tcs.placement.scoring.job import Job
 
 POSITION_BAR = 1e-6
@@ -74,6 +74,7 @@ class DrakeChecker:
         """Take a job, its scene, and the name of its dexterity measure."""
         self._job, self._scene, self._measure = job, scene, measure
         self._lower, self._upper = scene.arm_limits
+        self._turn = _axis_of_turn(job, scene)
         self._grid = job.scored_grid
         self._axes = [axis.name for axis in self._grid.environment_axes]
 
@@ -122,7 +123,10 @@ class DrakeChecker:
             for first, second, distance in scene.violations()
             if distance < scene.required_clearance(first, second) - CLEARANCE_ROUNDING
         ]
-        exact = measured(scene.tool_jacobian(), q, self._lower, self._upper, self._measure)
+        J = scene.tool_jacobian()
+        if self._turn is not None:
+            J = prescribed(J, X_WT.rotation().matrix() @ self._turn)
+        exact = measured(J, q, self._lower, self._upper, self._measure)
         return Finding(
             position_error=position,
             rotation_error=rotation,
@@ -131,3 +135,15 @@ class DrakeChecker:
             limit_violations=int(np.sum((q < self._lower) | (q > self._upper))),
             contacts=len(contacts),
         )
+
+
+def _axis_of_turn(job: Job, scene: Scene) -> NDArray[np.float64] | None:
+    """Return the axis about which goals leave an arm of five joints free; None for other arms."""
+    before = scene.positions()
+    try:
+        scene.set_arm(np.zeros(len(scene.arm_limits[0])))
+        chain, _ = arm_chain(scene)
+    finally:
+        scene.restore(before)
+    axis = axis_of_turn(job.task, chain, scene.spec.robot.name)
+    return None if axis is None else np.array(axis)

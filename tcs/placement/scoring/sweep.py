@@ -44,8 +44,8 @@ ANALYTIC, NUMERIC = "analytic", "numeric"
 """Solution of the inverse kinematics: in closed form, or by Newton's method from many starts."""
 _ENTRIES = {ANALYTIC: "analytic.pairs.score_pair", NUMERIC: "numeric.pairs.score_pair"}
 """Pair scorers, compiled last but for the sweep: package, module and function."""
-_SIX_JOINTS = "six_joints.pairs.score_pair"
-"""The pair scorer of arms of six joints."""
+_OF_FEWER = {5: "five_joints.pairs.score_turned", 6: "six_joints.pairs.score_pair"}
+"""The pair scorers of arms of fewer than seven joints, by the number of joints."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +185,7 @@ def warm_up(
         ArmClassError: If there are approaches, and the arm has no closed form.
         MemoryError: If the address space is limited, and too little is left.
     """
-    entries = [_ENTRIES[ik_of(problem)] if problem.joints == 7 else _SIX_JOINTS]
+    entries = [_OF_FEWER.get(problem.joints, _ENTRIES[ik_of(problem)])]
     if approaches is not None:
         check_closed_form(problem)
         entries.append(ENTRY)

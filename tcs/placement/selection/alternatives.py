@@ -67,9 +67,14 @@ class Distinct:
         # Distance of every cell from each member of the other set, shape (N, m).
         offset = sets.cell_xy[:, None] - sets.cell_xy[sets.cell[other]]
         apart = np.hypot(offset[..., 0], offset[..., 1]) >= self.min_apart - 1e-9
-        of_members = [apart[sets.cell[member]] for member in members]
-        differ = np.logical_or.reduce([np.all(far, axis=1) for far in of_members])
-        differ |= np.any(np.logical_and.reduce(of_members), axis=1)
+        # One bit for each member of the other set: there are millions of sets, and few cells.
+        bits = (apart << np.arange(other.size)).sum(axis=1).astype(np.uint8)[sets.cell]
+        of_members = [bits[member] for member in members]
+        differ = np.bitwise_and.reduce(of_members) != 0
+        for far in of_members:
+            differ |= far == (1 << other.size) - 1
+        if sets.state.min() == sets.state.max():
+            return np.asarray(differ)
         state = np.stack([sets.state[member] for member in members])
         same = state[:, :, None] == sets.state[other]
         differ |= ~(np.all(np.any(same, axis=2), axis=0) & np.all(np.any(same, axis=0), axis=1))

@@ -26,6 +26,7 @@ from tcs.placement.selection.observed import Match, nearest_table
 from tcs.placement.selection.penalties import Penalties, penalties_of
 from tcs.placement.selection.refined import RefinedQuery, grid_only
 from tcs.placement.selection.search import best_set
+from tcs.placement.selection.starts import starts_of
 from tcs.placement.selection.travel import Legs, TravelWeights, legs_from, shortest_tour
 from tcs.placement.selection.utility import UtilityWeights, utility
 from tcs.placement.store import MotionFile, ScoreFile
@@ -35,6 +36,8 @@ from tcs.placement.tables.sets import MOST_MEMBERS
 _DEFAULT_WEIGHTS = UtilityWeights()
 _DEFAULT_TRAVEL = TravelWeights()
 _NO_CONSTRAINTS = Constraints()
+MOST_CHOSEN = 1000
+"""Most sets whose members and scores are kept, a kilobyte each: few are the best from anywhere."""
 
 
 def select(
@@ -225,6 +228,11 @@ class _Query:
             return best_estimated(
                 sets, self.tables.success, legs, weights, self.max_members, candidates
             )
+        if distinct is None and self.found is None:
+            starts = starts_of(self.tables.index, legs, weights, self.penalties)
+            shared = None if starts is None else starts.best(legs.here_to_cell, self.max_members)
+            if shared is not None:
+                return shared
         singles = self.singles.copy()
         if distinct is not None:
             singles[~distinct.of_sets((np.arange(singles.size),))] = -np.inf
@@ -300,13 +308,10 @@ class _Query:
         tables, legs = self.tables, self.legs
         member = np.array(rows)
         between = legs.between(member[:, None], member[None, :])
-        cost, order = shortest_tour([float(leg) for leg in legs.from_here[member]], between)
-        indices = tuple(int(h) for h in tables.sets.candidates[member])
-        members = tuple(tables.grid.configuration(h) for h in indices)
-        reached, dexterity = (of_all[member] for of_all in self.scores)
-        of_goals = tables.sets.weights
-        reachability = float(tc_reachability(np.any(reached, axis=0), of_goals))
-        manipulability = float(tc_manipulability(np.max(dexterity, axis=0), of_goals))
+        cost, order = shortest_tour(legs.from_here_to(member).tolist(), between)
+        chosen = self._chosen(rows)
+        indices, members = chosen.indices, chosen.members
+        reachability, manipulability = chosen.reachability, chosen.manipulability
         row = tables.success.row_of(indices) if tables.success is not None else None
         success, interval, low = None, None, None
         if tables.success is not None and row is not None:
@@ -335,3 +340,33 @@ class _Query:
             warnings=self.found.warnings if self.found is not None else (),
             seconds=0.0,
         )
+
+    def _chosen(self, rows: tuple[int, ...]) -> _ChosenSet:
+        """Return what a set of candidates is from any state; kept with the tables."""
+        tables = self.tables
+        kept: dict[tuple[int, ...], _ChosenSet] = tables.derived.setdefault("chosen sets", {})
+        found = kept.get(rows) if self.found is None else None
+        if found is None:
+            member = np.array(rows)
+            indices = tuple(int(h) for h in tables.sets.candidates[member])
+            reached, dexterity = (of_all[member] for of_all in self.scores)
+            of_goals = tables.sets.weights
+            found = _ChosenSet(
+                indices,
+                tuple(tables.grid.configuration(h) for h in indices),
+                float(tc_reachability(np.any(reached, axis=0), of_goals)),
+                float(tc_manipulability(np.max(dexterity, axis=0), of_goals)),
+            )
+            if self.found is None and len(kept) < MOST_CHOSEN:
+                kept[rows] = found
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class _ChosenSet:
+    """A set of candidates, without what depends on the current state."""
+
+    indices: tuple[int, ...]
+    members: tuple[InitialConfiguration, ...]
+    reachability: float
+    manipulability: float

@@ -9,7 +9,8 @@ the scores of the others are computed.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, replace
+import sys
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -93,15 +94,25 @@ def best_set(bounds: Bounds, to_beat: float) -> Found | None:
 
 def _best_among(bounds: Bounds, to_beat: float, best: Found | None) -> Found | None:
     """Return the best set of the groups of some bounds, or the best one so far."""
-    remaining = _promising(bounds, np.flatnonzero(bounds.groups > to_beat), best)
     search = _Search(bounds, to_beat, best)
-    budget = FIRST_CANDIDATES
-    while remaining.size:
-        now, remaining = _split(bounds, remaining, budget)
-        search.open(now)
-        remaining = _promising(bounds, remaining, search.best)
-        budget = min(3 * budget, MOST_CANDIDATES)
+    search.run()
     return search.best
+
+
+def near_best_sets(bounds: Bounds, margin: float) -> list[tuple[int, ...]]:
+    """Return the members of the kept sets whose utility is near the greatest, in no order.
+
+    Args:
+        bounds: Bounds on the utility of the sets.
+        margin: Greatest difference from it.
+    """
+    search = _SearchNearBest(bounds, -sys.float_info.max, None, margin)
+    search.run()
+    return [
+        tuple(int(member[row]) for member in members)
+        for utilities, members in search.found
+        for row in np.flatnonzero(utilities >= search.least)
+    ]
 
 
 @dataclass
@@ -116,6 +127,29 @@ class _Search:
     def least(self) -> float:
         """The utility that a set must have to be examined."""
         return self.to_beat if self.best is None else self.best.utility
+
+    def run(self) -> None:
+        """Examine the groups that may hold a better set, those with the greatest bounds first."""
+        bounds, budget = self.bounds, FIRST_CANDIDATES
+        remaining = self.promising(np.flatnonzero(bounds.groups > self.to_beat))
+        while remaining.size:
+            now, remaining = _split(bounds, remaining, budget)
+            self.open(now)
+            remaining = self.promising(remaining)
+            budget = min(3 * budget, MOST_CANDIDATES)
+
+    def promising(self, remaining: IntArray) -> IntArray:
+        """Return the groups that may hold a better set, or an equal one earlier in the order."""
+        return _promising(self.bounds, remaining, self.best)
+
+    def record(self, utilities: FloatArray, members: tuple[IntArray, ...]) -> None:
+        """Compare kept sets with the best one so far; there is at least one."""
+        best = utilities.max()
+        ties = np.flatnonzero(utilities == best)
+        first = ties[np.lexsort(tuple(member[ties] for member in reversed(members)))[0]]
+        found = Found(float(best), tuple(int(member[first]) for member in members))
+        if found.utility > self.to_beat and found.beats(self.best):
+            self.best = found
 
     def open(self, groups: IntArray) -> None:
         """Examine the sets of some groups."""
@@ -143,9 +177,9 @@ class _Search:
         """
         if not feasible:
             ascending = tuple(np.sort(members, axis=0))
-            found = _best_of(self.bounds, ascending, groups[which], self.least)
-            if found is not None and found.utility > self.to_beat and found.beats(self.best):
-                self.best = found
+            utilities, kept = _kept_sets(self.bounds, ascending, groups[which], self.least)
+            if utilities.size:
+                self.record(utilities, kept)
             return
         count = feasible[0].size[which]
         some = np.flatnonzero(count)
@@ -178,6 +212,29 @@ class _Search:
         if not np.all(keep):
             which, members = which[keep], tuple(member[keep] for member in members)
         self._join(groups, which, members, feasible)
+
+
+@dataclass
+class _SearchNearBest(_Search):
+    """All sets found so far that may be near the best one."""
+
+    margin: float = 0.0
+    found: list[tuple[FloatArray, tuple[IntArray, ...]]] = field(default_factory=list)
+
+    @property
+    def least(self) -> float:
+        """The utility that a set must have to be examined."""
+        return self.to_beat if self.best is None else self.best.utility - self.margin
+
+    def promising(self, remaining: IntArray) -> IntArray:
+        """Return the groups that may hold a set near the best one."""
+        return remaining[self.bounds.groups[remaining] >= self.least]
+
+    def record(self, utilities: FloatArray, members: tuple[IntArray, ...]) -> None:
+        """Compare kept sets with the best one so far, and keep those near it."""
+        super().record(utilities, members)
+        near = utilities >= self.least
+        self.found.append((utilities[near], tuple(member[near] for member in members)))
 
 
 def _split(bounds: Bounds, remaining: IntArray, budget: int) -> tuple[IntArray, IntArray]:
@@ -219,17 +276,17 @@ def _earliest(index: GroupIndex, groups: IntArray) -> tuple[IntArray, ...]:
     return tuple(np.sort([index.all.earliest[cells[groups]] for cells in index.cells], axis=0))
 
 
-def _best_of(
+def _kept_sets(
     bounds: Bounds, members: tuple[IntArray, ...], group: IntArray, least: float
-) -> Found | None:
-    """Return the best kept set of at least this utility, the first among equals."""
+) -> tuple[FloatArray, tuple[IntArray, ...]]:
+    """Return utility and members of the kept sets of at least this utility, shapes (n,)."""
     cost = tour_costs(bounds.legs, members)
     # The exact travel cost rejects most sets before their scores, which take longer.
     feasible = np.flatnonzero(bounds.of_set(group, members, cost) >= least)
     members, cost = tuple(member[feasible] for member in members), cost[feasible]
     every, lowered = bounds.index.all, bounds.lowered
     of_sets = every if lowered is None else lowered
-    scores = _scores(of_sets.dexterity, of_sets.reached, every.sets.weights, members)
+    scores = scores_of(of_sets.dexterity, of_sets.reached, every.sets.weights, members)
     utilities = utility(*scores, cost, bounds.weights)
     if bounds.penalties is not None:
         utilities = utilities - bounds.penalties.of_sets(members)
@@ -238,21 +295,16 @@ def _best_of(
     scores = scores[0][enough], scores[1][enough]
     if lowered is not None:
         # Stored sets are compared, so the rule applies to their stored scores.
-        scores = _scores(every.dexterity, every.reached, every.sets.weights, members)
-    is_kept = _is_kept(bounds.index, members, *scores)
-    if bounds.distinct is not None:
-        is_kept &= bounds.distinct.of_sets(members)
-    kept = np.flatnonzero(is_kept)
-    if not kept.size:
-        return None
+        scores = scores_of(every.dexterity, every.reached, every.sets.weights, members)
+    kept = np.flatnonzero(_is_kept(bounds.index, members, *scores))
     members, utilities = tuple(member[kept] for member in members), utilities[kept]
-    best = utilities.max()
-    ties = np.flatnonzero(utilities == best)
-    first = ties[np.lexsort(tuple(member[ties] for member in reversed(members)))[0]]
-    return Found(float(best), tuple(int(member[first]) for member in members))
+    if bounds.distinct is None:
+        return utilities, members
+    is_distinct = bounds.distinct.of_sets(members)
+    return utilities[is_distinct], tuple(member[is_distinct] for member in members)
 
 
-def _scores(
+def scores_of(
     dexterity: NDArray[np.floating[Any]],
     reached: NDArray[np.bool_],
     weights: FloatArray,

@@ -97,6 +97,11 @@ class Legs:
         """Cost of the leg from the current state to each candidate, shape (C,)."""
         return self._with_levels(self.here_to_cell[self.cell], self.here_levels, self.levels)
 
+    def from_here_to(self, member: NDArray[np.int64]) -> FloatArray:
+        """Return the cost of the leg from the current state to some candidates, shape (n,)."""
+        driving = self.here_to_cell[self.cell[member]]
+        return self._with_levels(driving, self.here_levels, self.levels[member])
+
     @cached_property
     def levels_from_here(self) -> FloatArray:
         """Cost of that leg without driving, shape (C,)."""

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.stats import rankdata
 
 import tcs
 from tcs.errors import DataFileError, TcsError
 from tcs.model.people import LINKS, Bodies, draw_bodies, load_people, papers_man
 from tcs.placement.population import Population, SetForPeople, population, ranking, tree
+from tcs.placement.population.differences import _ranks
 from tcs.placement.robustness.statistics import binomial_interval
 from tests.environments import CORNER, write_environment
 
@@ -136,3 +138,9 @@ def test_people_are_read_from_a_table(tmp_path):
         path.write_text(text)
         with pytest.raises(DataFileError, match=message):
             load_people(path)
+
+
+@pytest.mark.parametrize("different", [1, 3, 1000])
+def test_ranks_are_those_of_scipy(different):
+    values = np.random.default_rng(different).integers(0, different, 200).astype(float)
+    np.testing.assert_array_equal(_ranks(values), rankdata(values))

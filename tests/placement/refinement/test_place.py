@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import importlib
-
 import numpy as np
 import pytest
 
 import tcs
 from tcs.errors import TaskError, TcsError
+from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.model.robots import load_robot
 from tcs.model.scene import EMPTY_ENVIRONMENT, Scene, SceneSpec
+from tcs.placement.refinement import base_poses, joint_path
+from tcs.placement.refinement.poses import PoseScene, PoseScorer
+from tcs.placement.tables import Points
 
 
 def line(length, count=8):
@@ -57,18 +59,49 @@ def test_region_and_obstacles_are_respected(placed):
 
 
 def test_a_finer_grid_is_tried_where_the_first_does_not_suffice(monkeypatch):
-    module = importlib.import_module("tcs.placement.refinement.place")
-    best = module._best
+    best = base_poses._best
 
     def worse(scorer, scene, fineness):
         bases = best(scorer, scene, fineness)
-        if fineness is module.FIRST:
+        if fineness is base_poses.FIRST:
             bases = [base._replace(reached=base.reached & (np.arange(8) > 0)) for base in bases]
         return bases
 
-    monkeypatch.setattr(module, "_best", worse)
+    monkeypatch.setattr(base_poses, "_best", worse)
     region = ((0.4, 0.7), (-0.2, 0.2))
     assert tcs.place("iiwa7", line(0.3), region=region).reached.all()
+
+
+def test_base_poses_far_from_each_other_are_tried_where_the_best_have_no_path(monkeypatch):
+    tried = []
+
+    def blocked_near_the_best(problem, through=None):
+        base = np.array([problem.base_x[0], problem.base_y[0]])
+        tried.append(base)
+        is_far = np.linalg.norm(base - tried[0]) > 0.25
+        return joint_path.joint_path(problem, through) if is_far else None
+
+    monkeypatch.setattr(base_poses, "joint_path", blocked_near_the_best)
+    found = tcs.place("iiwa7", line(0.3), region=((0.2, 0.9), (-0.6, 0.6)))
+    assert found.reached.all()
+    assert found.continuous == (True,)
+    assert len(tried) > base_poses.FIRST.screened
+    assert len(tried) <= base_poses.FIRST.screened + base_poses.SPREAD.screened
+
+
+def test_base_poses_are_scored_alike_together_and_alone():
+    scene = PoseScene.of(load_robot("iiwa7"), (), 0.0, DEFAULT_MEASURE)
+    x, y, yaw = np.meshgrid([0.0, 0.4, 0.6], [-0.2, 0.1], [0.0, 2.0, 4.0], indexing="ij")
+    values = np.stack([x, y, yaw, np.zeros_like(x)], axis=-1).reshape(-1, 4)
+    values = np.random.default_rng(0).permutation(values)
+    scorer = PoseScorer.of(scene, line(0.3), None, jobs=2)
+    points = Points(values, np.zeros(len(values), dtype=np.int64))
+    together = scorer.score(points)
+    assert 0 < together.reached.sum() < together.reached.size
+    for i in range(len(values)):
+        alone = scorer.score(Points(values[i : i + 1], points.arm[:1]))
+        for array, row in zip(together, alone, strict=True):
+            np.testing.assert_array_equal(array[i : i + 1], row)
 
 
 def test_poses_too_far_apart_need_two_stops():

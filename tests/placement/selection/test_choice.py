@@ -12,7 +12,14 @@ from tcs.model.grid import Grid, InitialConfiguration
 from tcs.placement.constraints import Constraints
 from tcs.placement.scoring.base_lattice import lattice_of
 from tcs.placement.scoring.sets import build_sets
-from tcs.placement.selection import SelectionTables, TravelWeights, UtilityWeights, search, select
+from tcs.placement.selection import (
+    SelectionTables,
+    TravelWeights,
+    UtilityWeights,
+    search,
+    select,
+    starts,
+)
 from tcs.placement.tables import Reason, ScoreTable
 from tests.placement.tables.small import all_sets, random_scores, small_grid
 
@@ -119,6 +126,7 @@ place = st.one_of(st.sampled_from([-0.7, -0.5, -0.1, 0.1, 0.3]), st.floats(-3.0,
     ).filter(lambda options: options["rule"] == "paper" or options["max_members"] < 3),
     chunk=st.sampled_from([3, search.CHUNK]),
     cells=st.sampled_from([(search.FIRST_CELLS, search.MOST_CELLS), (1, 1.0), (2, 0.5)]),
+    opened=st.sampled_from([2, 1000]),
 )
 def test_equals_brute_force_over_all_kept_sets(
     seed,
@@ -136,6 +144,7 @@ def test_equals_brute_force_over_all_kept_sets(
     options,
     chunk,
     cells,
+    opened,
 ):
     bed, head, arms = beds
     grid = small_grid(
@@ -168,9 +177,13 @@ def test_equals_brute_force_over_all_kept_sets(
         patch.setattr(search, "FIRST_CELLS", cells[0])
         patch.setattr(search, "MOST_CELLS", cells[1])
         constraints = Constraints(prefer=("base_yaw = 120 deg", "base_x <= 0")) if turned else None
-        choice = select(
-            tables, here, weights=weights, travel=travel, constraints=constraints or Constraints()
-        )
+        asked = {"weights": weights, "travel": travel, "constraints": constraints or Constraints()}
+        choice = select(tables, here, **asked)
+        patch.setattr(starts, "MOST_OPENED", opened)
+        for x in (here.base_x + 1.0, here.base_x, here.base_x):
+            # Later selections of the same kind use what is kept of the former.
+            later = select(tables, dataclasses.replace(here, base_x=x), **asked)
+    assert dataclasses.replace(later, seconds=choice.seconds) == choice
     disliked = (lambda c: abs(c.base_yaw - 2.0943951) > 1e-3, lambda c: c.base_x > 1e-9)
     members, value, cost = brute_force(
         kept, grid, here, weights, travel, disliked if turned else ()
@@ -249,6 +262,9 @@ def test_equals_brute_force_around_the_furniture(
             select(tables, here, weights=weights, travel=travel)
         return
     choice = select(tables, here, weights=weights, travel=travel)
+    for _ in range(2):
+        later = select(tables, here, weights=weights, travel=travel)
+        assert dataclasses.replace(later, seconds=choice.seconds) == choice
     assert choice.unreachable == sum(not np.isfinite(metres[c]) for c in cell.values())
     assert choice.utility == pytest.approx(best[1], rel=1e-12, abs=1e-12)
     if not turn:
@@ -300,6 +316,10 @@ def test_equals_brute_force_on_a_larger_table(seed, levels, monkeypatch):
         weights = UtilityWeights(
             reachability=alpha, manipulability=beta, travel=gamma, places=0.0, environment=0.0
         )
+        choice = select(tables, here, weights=weights)
+        assert choice.indices == members[first]
+        assert choice.utility == values[first]
+        select(tables, dataclasses.replace(here, base_x=x + 0.3), weights=weights)
         choice = select(tables, here, weights=weights)
         assert choice.indices == members[first]
         assert choice.utility == values[first]

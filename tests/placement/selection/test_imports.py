@@ -7,3 +7,11 @@ def test_choosing_needs_neither_simulator_nor_compiler():
         "print([m for m in ('pydrake', 'numba', 'matplotlib') if m in sys.modules])"
     )
     assert fresh(code) == "[]"
+
+
+def test_scenes_and_populations_need_no_meshes_or_statistics():
+    code = (
+        "import sys, tcs.model.scene, tcs.placement.population;"
+        "print([m for m in ('trimesh', 'scipy.stats') if m in sys.modules])"
+    )
+    assert fresh(code) == "[]"
