@@ -28,6 +28,11 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+_MOST_LISTED = 40
+"""Most known names that a message lists; of more it lists those most alike."""
+_ALIKE = 10
+"""Number of these."""
+
 
 def one_line(text: str, most: int = 80) -> str:
     r"""Return a text from a file for a message: short, and without line breaks or control codes.
@@ -64,6 +69,9 @@ class UnknownNameError(TcsError):
         hint = f" Did you mean '{near[0]}'?" if near else ""
         prefix = f"{where}: " if where else ""
         listed = ", ".join(self.known) or "none"
+        if len(self.known) > _MOST_LISTED:
+            alike = difflib.get_close_matches(name, self.known, n=_ALIKE, cutoff=0.0)
+            listed = f"{', '.join(sorted(alike))} and {len(self.known) - len(alike)} others"
         super().__init__(f"{prefix}unknown {what} '{one_line(name)}'. Known: {listed}.{hint}")
 
 

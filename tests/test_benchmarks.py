@@ -62,6 +62,7 @@ def peers(*arguments: str) -> subprocess.CompletedProcess[str]:
             "campaign.py",
             "scale.py",
             "faults.py",
+            "freedom.py",
             "live.py",
             "numeric_arms.py",
             "robots.py",

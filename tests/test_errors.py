@@ -54,5 +54,18 @@ def test_an_unknown_name_suggests_no_distant_name():
     assert message == "unknown frame 'xyz'. Known: head."
 
 
+def test_of_many_known_names_the_most_alike_are_listed():
+    """A robot has a hundred joints, and a message is read in a terminal."""
+    known = [f"{side}_{part}_{i}" for side in ("left", "right") for part in "ab" for i in range(30)]
+    error = UnknownNameError("joint", "left_a_07", known)
+    assert error.known == tuple(sorted(known))
+    message = str(error)
+    assert message.endswith(" and 110 others. Did you mean 'left_a_7'?")
+    listed = message.partition("Known: ")[2].partition(" and ")[0].split(", ")
+    assert len(listed) == 10
+    assert "left_a_7" in listed
+    assert not any("right" in name for name in listed)
+
+
 def test_unknown_name_where_nothing_is_known():
     assert str(UnknownNameError("task", "shaving", [])) == "unknown task 'shaving'. Known: none."

@@ -38,7 +38,7 @@ def of_extras() -> set[str]:
     extras = PROJECT["optional-dependencies"]
     lines = [
         line
-        for name in ("arplace", "bags", "dask", "mcp", "ros2", "service")
+        for name in ("arplace", "bags", "dask", "distances", "mcp", "ros2", "service")
         for line in extras[name]
     ]
     names = {re.split(r"[^\w-]", line)[0] for line in lines}

@@ -8,6 +8,7 @@ import webbrowser
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any
@@ -115,8 +116,9 @@ def serve(
         bool,
         typer.Option(
             "--prepare/--no-prepare",
-            help="Once it answers, import Drake and load the kernel, so that the first job need "
-            "not; without, less memory is used until then. Not with --mcp.",
+            help="Import Drake, load the kernel and build a scene before it says that it is ready, "
+            "so that the first job need not; without, less memory is used until then. Not with "
+            "--mcp.",
         ),
     ] = True,
     *,
@@ -138,11 +140,13 @@ def serve(
     http = _http("serve")
     access = http.checked_access(host, token)
     with _engine(files, jobs, typer.echo) as engine:
-        server = http.Server(
-            http.make_application(engine, access), host=host, port=port,
-            on_listening=engine.prepare if prepare else None,
-        )  # fmt: skip
-        terminal.note(f"{server.url}, requests at {server.url}/docs; Ctrl-C ends.")
+
+        def listening() -> None:
+            ready = f"{server.url}, requests at {server.url}/docs; Ctrl-C ends."
+            _say_ready(engine, ready, prepare=prepare)
+
+        application = http.make_application(engine, access)
+        server = http.Server(application, host=host, port=port, on_listening=listening)
         server.run()
 
 
@@ -229,9 +233,8 @@ def _serve_ros1(
         _engine(files, jobs, typer.echo) as engine,
         Ros1Node(engine, names, max_age=frames.max_age) as node,
     ):
-        terminal.note("the services of ROS 1 are at /tcs: `rosservice list`; Ctrl-C ends.")
-        if prepare:
-            engine.prepare()
+        ready = "the services of ROS 1 are at /tcs: `rosservice list`; Ctrl-C ends."
+        _say_ready(engine, ready, prepare=prepare)
         node.run()
 
 
@@ -259,12 +262,18 @@ def _serve_ros2(
             engine, names, zenoh_config(router), max_age=frames.max_age, domain=domain
         ) as node,
     ):
-        terminal.note(
-            f"the services of ROS 2 are at /tcs, domain {domain}, router {router}; Ctrl-C ends."
-        )
-        if prepare:
-            engine.prepare()
+        ready = f"the services of ROS 2 are at /tcs, domain {domain}, router {router}; Ctrl-C ends."
+        _say_ready(engine, ready, prepare=prepare)
         node.run()
+
+
+def _say_ready(engine: Engine, line: str, *, prepare: bool) -> None:
+    """Print that requests are answered, and first prepare for the jobs; returns at once."""
+    say = partial(terminal.note, line)
+    if prepare:
+        engine.prepare(say)
+    else:
+        say()
 
 
 def _http(command: str) -> Any:

@@ -26,7 +26,7 @@ from tcs.service.conversions import (
     utility_of,
 )
 from tcs.service.floor import floor_of, outcome_of
-from tcs.service.heavy_imports import import_heavy, import_steps
+from tcs.service.heavy_imports import drawing_steps, import_heavy, import_scoring
 from tcs.service.jobs import Jobs, Progress
 from tcs.service.limits import Limits
 from tcs.service.postures import ScenePostures
@@ -100,14 +100,19 @@ class Engine:
         self._jobs.close()
         self._stack.close()
 
-    def prepare(self) -> Preparation:
+    def prepare(self, on_end: Callable[[], object] | None = None) -> Preparation:
         """Begin, in a thread, what the first job would wait for, and return it.
 
-        Drake is imported, and the kernel's machine code loaded; where there is none yet, it is not
-        compiled. Choosing from files needs neither, and far less memory.
+        Drake is imported, the kernel's machine code loaded, a scene built, and what draws imported;
+        where there is no machine code yet, it is not compiled. Choosing from files needs none of
+        this, and far less memory.
+
+        Args:
+            on_end: Called by the thread when it is done, or a step has failed.
         """
         if self._preparation is None:
-            self._preparation = Preparation((*import_steps(), self._work.prepare))
+            steps = (import_scoring, self._work.prepare, *drawing_steps())
+            self._preparation = Preparation(steps, on_end)
         return self._preparation
 
     @property
@@ -353,8 +358,9 @@ class Engine:
         if (request.task is None) == (request.task_yaml is None):
             raise ServiceError("give 'task' or 'task_yaml', and not both.")
         if isinstance(request, ScoreHereRequest):
-            return "score-here", self._plainly(partial(self._work.score_here, request))
-        return "score", self._plainly(partial(self._work.score, request))
+            work = partial(self._work.score_here, request)
+            return "score-here", self._plainly(work, import_scoring)
+        return "score", self._plainly(partial(self._work.score, request), import_scoring)
 
     def _work_with_file(
         self, request: JobRequest
@@ -373,13 +379,20 @@ class Engine:
         return what, self._plainly(partial(done, request))
 
     def _plainly(
-        self, work: Callable[[Progress], dict[str, Any]]
+        self,
+        work: Callable[[Progress], dict[str, Any]],
+        prepared: Callable[[], None] = import_heavy,
     ) -> Callable[[Progress], dict[str, Any]]:
-        """Return work whose result JSON can hold, and whose messages name no temporary folder."""
+        """Return work whose result JSON can hold, and whose messages name no temporary folder.
+
+        Args:
+            work: The work of a job.
+            prepared: Imports what it needs, while no other thread imports the same.
+        """
 
         def done(progress: Progress) -> dict[str, Any]:
             try:
-                import_heavy()
+                prepared()
                 return dict(without_infinities(work(progress)))
             except UnknownNameError as error:
                 where = self._sent.without_folder(error.where)

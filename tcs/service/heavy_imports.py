@@ -11,22 +11,25 @@ from functools import partial
 from importlib import import_module
 
 _LOCK = threading.Lock()
-_MODULES = (
-    "tcs.placement.scoring",
-    "tcs.output.report.score.pictures",
-    "tcs.output.view.scene_objects",
-)
+_SCORING = "tcs.placement.scoring"
+_DRAWING = ("tcs.output.report.score.pictures", "tcs.output.view.scene_objects")
+
+
+def import_scoring() -> None:
+    """Import what scenes are built and scored with; returns at once the next time."""
+    _import(_SCORING)
 
 
 def import_heavy() -> None:
-    """Import what scenes are built and drawn with; returns at once the next time."""
-    for step in import_steps():
+    """Import what scenes are built, scored and drawn with; returns at once the next time."""
+    import_scoring()
+    for step in drawing_steps():
         step()
 
 
-def import_steps() -> tuple[Callable[[], None], ...]:
-    """Return functions that do together what `import_heavy` does."""
-    return tuple(partial(_import, name) for name in _MODULES)
+def drawing_steps() -> tuple[Callable[[], None], ...]:
+    """Return functions that import what scenes are drawn with, after `import_scoring`."""
+    return tuple(partial(_import, name) for name in _DRAWING)
 
 
 def _import(name: str) -> None:

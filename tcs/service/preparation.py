@@ -17,9 +17,16 @@ class Preparation:
     A step that fails ends the preparation: the job that needs it does it again, and reports why.
     """
 
-    def __init__(self, steps: Sequence[Callable[[], None]]) -> None:
-        """Start the thread."""
-        self._steps, self._stopped = tuple(steps), threading.Event()
+    def __init__(
+        self, steps: Sequence[Callable[[], None]], on_end: Callable[[], object] | None = None
+    ) -> None:
+        """Start the thread.
+
+        Args:
+            steps: What is done.
+            on_end: Called by the thread at the end, after a step that failed too, unless stopped.
+        """
+        self._steps, self._on_end, self._stopped = tuple(steps), on_end, threading.Event()
         # Not a daemon: native code that is being loaded must not meet the end of the interpreter.
         self._thread = threading.Thread(target=self._run, name="tcs-preparation")
         self._thread.start()
@@ -32,7 +39,9 @@ class Preparation:
                 step()
             except (TcsError, ImportError, MemoryError, OSError) as error:
                 _LOG.info("not prepared: %s", error)
-                return
+                break
+        if self._on_end is not None and not self._stopped.is_set():
+            self._on_end()
 
     def wait(self) -> None:
         """Wait until all steps are done."""

@@ -168,9 +168,18 @@ class ScoreFiles:
             NotFoundError: If no file of that digest is held.
         """
         with self._lock:
-            held = self.held(digest)
+            path, file = self.held(digest).path, self._loaded.get(digest)
+        if file is None:
+            try:
+                # It takes up to seconds, in which other files are used.
+                file = load_scores(path)
+            except StoreError:
+                self.held(digest)
+                raise
+        with self._lock:
             if digest not in self._loaded:
-                self._remember(digest, load_scores(held.path))
+                self.held(digest)
+                self._remember(digest, file)
             self._loaded.move_to_end(digest)
             return self._loaded[digest]
 

@@ -23,6 +23,12 @@ return [...document.querySelectorAll("button, select, summary, input, a.button")
   .map(one => one.outerHTML.slice(0, 80));
 """
 
+NAMES = """
+const [done, bodies] = [arguments[1], arguments[0]];
+import("/app/texts.js").then(found =>
+  done(bodies.map(one => found.bodyName(one, name => name === "wall"))));
+"""
+
 AXE = Path(__file__).parents[2] / "node_modules" / "axe-core" / "axe.min.js"
 RUN_AXE = """
 const done = arguments[arguments.length - 1];
@@ -64,6 +70,24 @@ def page(request, url, browser):
     browser.wait(lambda: browser.driver.execute_script(drawn))
     yield browser
     assert all(address.startswith(url) for address in browser.fetched())
+    assert browser.complaints() == []
+
+
+def test_without_a_file_only_scoring_is_offered(browser):
+    script = browser.driver.execute_script
+    with Engine() as engine:
+        application = make_application(engine, Access())
+        add_page(application)
+        with Server(application, host="127.0.0.1", port=0) as server:
+            browser.driver.get("about:blank")
+            browser.driver.get(f"{server.url}/#language=en")
+            tasks = "return document.getElementById('task').options.length"
+            browser.wait(lambda: script(tasks) > 5)
+            shown = "return [...arguments].map(id => document.getElementById(id).checkVisibility())"
+            parts = ("score", "words", "limits", "floor", "space", "cards", "expert", "files")
+            assert script(shown, *parts) == [True] * 3 + [False] * 5
+            assert "Choose a task above" in script(WORDS)
+            browser.driver.get("about:blank")
     assert browser.complaints() == []
 
 
@@ -175,6 +199,37 @@ def test_the_3d_view_follows_and_motions_are_played(page):
         assert script(label) == "Play"
         paused = script(time)
         assert script(time) == paused
+
+
+def test_what_is_not_checked_is_in_view_and_files_are_in_the_header(page):
+    script = page.driver.execute_script
+    seen = "const {top, bottom} = document.querySelector('footer').getBoundingClientRect();"
+    for scrolled in ("0", "document.body.scrollHeight"):
+        script(f"scrollTo(0, {scrolled})")
+        assert script(f"{seen} return top > 0 && bottom <= innerHeight")
+    assert "driving" in script("return document.querySelector('footer').textContent")
+    script("document.querySelector('header #files').open = true")
+    assert not script("return document.getElementById('shared').innerText")
+    script("document.getElementById('share').click()")
+    page.wait(lambda: "copied" in script("return document.getElementById('shared').innerText"))
+    for name in ("report", "download", "downloadEnvironment", "page3d"):
+        assert page.driver.find_element("css selector", f"header #{name}").is_displayed()
+
+
+def test_bodies_have_names_for_readers(page):
+    script = page.driver.execute_script
+    bodies = ["l_gripper_r_finger_link", "person::arm_left_link", "wall", "r_forearm_link"]
+    assert page.driver.execute_async_script(NAMES, bodies) == [
+        "left finger of the gripper (robot)", "left upper arm (person)", "wall",
+        "right forearm (robot)",
+    ]  # fmt: skip
+    script("const one = document.getElementById('language'); one.value = 'de'; one.onchange()")
+    page.wait(lambda: "erreicht" in script(WORDS))
+    assert page.driver.execute_async_script(NAMES, bodies[1:3]) == [
+        "Oberarm links (Person)", "Wand",
+    ]  # fmt: skip
+    script("const one = document.getElementById('language'); one.value = 'en'; one.onchange()")
+    page.wait(lambda: "reached" in script(WORDS))
 
 
 def test_languages_and_sizes(page):

@@ -53,10 +53,10 @@ def test_nothing_is_from_elsewhere(name):
 
 
 def paths(texts: dict, above: str = "") -> set[str]:
-    """Return the keys of all texts; frames and goals may fall back to their own names."""
+    """Return the keys of all texts; frames, goals and bodies may fall back to their own names."""
     found = set()
     for key, value in texts.items():
-        if isinstance(value, dict) and key not in ("frames", "goalNames"):
+        if isinstance(value, dict) and key not in ("frames", "goalNames", "bodies"):
             found |= paths(value, f"{above}{key}.")
         else:
             found.add(f"{above}{key}")

@@ -38,7 +38,7 @@ def test_a_draft_overwrites_nothing(tcs_command, folder):
     [
         (("made_up.urdf", "--tool", "tol"), "Did you mean 'tool'?"),
         (("gone.urdf", "--tool", "tool"), "there is no file"),
-        (("made_up.urdf", "--tool", "arm5"), "only 5 in a row lead there"),
+        (("made_up.urdf", "--tool", "arm4"), "only 4 revolute joints in a row lead"),
         (("made_up.urdf", "--tool", "tool", "--out", "no/where.yaml"), "cannot be written"),
         (("made_up.urdf", "--tool", "tool", "--out", "mine.yml"), "must end in .yaml"),
     ],

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from tcs.cli.serve import _say_ready
+
 WITHOUT = "import sys; sys.modules['{}'] = None"
 
 
@@ -55,3 +57,27 @@ def test_the_page_ends_after_its_duration(tcs_command, small_file):
     ran = tcs_command("app", small_file, "--no-browser", "--duration", 0.2)
     assert ran.code == 0
     assert "open http://127.0.0.1:" in ran.err
+
+
+class Preparing:
+    """Stands in for an engine: keeps what is to be called once it is prepared."""
+
+    on_end = None
+
+    def prepare(self, on_end):
+        self.on_end = on_end
+
+
+def test_a_service_is_ready_once_it_is_prepared(capsys):
+    engine = Preparing()
+    _say_ready(engine, "at http://127.0.0.1:1", prepare=True)
+    assert capsys.readouterr().err == ""
+    engine.on_end()
+    assert capsys.readouterr().err == "tcs: at http://127.0.0.1:1\n"
+
+
+def test_without_preparation_it_is_ready_at_once(capsys):
+    engine = Preparing()
+    _say_ready(engine, "at http://127.0.0.1:1", prepare=False)
+    assert capsys.readouterr().err == "tcs: at http://127.0.0.1:1\n"
+    assert engine.on_end is None

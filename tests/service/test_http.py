@@ -17,7 +17,7 @@ from tcs.placement.store import save_scores
 from tcs.service import Engine, Limits, SelectRequest
 from tcs.service.client import Client
 from tcs.service.http import Access, Server, checked_access, make_application
-from tcs.service.http.file_queues import QUEUES, FileQueues
+from tcs.service.http.file_queues import QUEUES, QUICK, STREAK, FileQueues
 from tcs.service.http.protocol import MOST_HEAD_BYTES, BoundedProtocol
 from tests.placement.store.example import score_file
 
@@ -101,11 +101,64 @@ def test_headers_without_an_end_are_refused(server):
             assert b"200 OK" in whole.recv(65536)
 
 
+def burn(seconds: float) -> None:
+    """Take time of the processor."""
+    end = time.thread_time() + 1.01 * seconds
+    while time.thread_time() < end:
+        pass
+
+
+def test_a_large_body_is_no_head(http, server):
+    # The content may arrive together with the headers, in one part that is larger than a head.
+    large = json.dumps({"only": ["x" * 900] * 90})
+    assert len(large) > MOST_HEAD_BYTES
+    head = (
+        "POST /v1/select HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
+        f"Content-Length: {len(large)}\r\n\r\n"
+    )
+    address = httpx.URL(server.url)
+    with socket.create_connection((address.host, address.port), timeout=20) as whole:
+        whole.sendall((head + large).encode())
+        assert b" 413 " in whole.recv(4096).splitlines()[0]
+
+
+def test_quick_answers_need_no_thread_and_wait_for_no_slow_one():
+    threads: list[bool] = []
+
+    def quick() -> None:
+        threads.append(threading.current_thread() is threading.main_thread())
+
+    def slow() -> None:
+        quick()
+        burn(QUICK)
+
+    async def ask() -> None:
+        queues, file = FileQueues(), "0" * 64
+        for _ in range(STREAK):
+            await queues.run(file, "quick", quick)
+        assert not any(threads)
+        await queues.run(file, "quick", quick)
+        assert threads.pop()
+        waiting = asyncio.ensure_future(queues.run(file, "slow", slow))
+        await asyncio.sleep(0)
+        # The engine would let it wait for the other one: not where all connections wait with it.
+        await queues.run(file, "quick", quick)
+        assert waiting.done()
+        await queues.run("1" * 64, "slow", slow)
+        assert not any(threads)
+        await queues.run(file, "quick", slow)
+        await queues.run(file, "quick", quick)
+        assert threads[-2:] == [True, False]
+
+    asyncio.run(ask())
+
+
 def test_requests_about_a_file_are_answered_in_their_order():
     answered, threads = [], set()
 
     def answer(file: str, number: int) -> tuple[str, int]:
         time.sleep(0.001 * (number % 3))
+        burn(QUICK)
         threads.add(threading.get_ident())
         answered.append((file, number))
         return file, number
@@ -113,7 +166,7 @@ def test_requests_about_a_file_are_answered_in_their_order():
     async def ask() -> list[tuple[str, int]]:
         queues = FileQueues()
         sent = [(f"{file:064x}", number) for number in range(20) for file in range(6)]
-        waiting = [queues.run(one[0], lambda one=one: answer(*one)) for one in sent]
+        waiting = [queues.run(one[0], "kind", lambda one=one: answer(*one)) for one in sent]
         assert await asyncio.gather(*waiting) == sent
         return sent
 

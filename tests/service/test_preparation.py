@@ -10,7 +10,7 @@ import pytest
 import tcs.placement.scoring
 from tcs.errors import SelectionError
 from tcs.placement.store import save_scores
-from tcs.service import Engine
+from tcs.service import Engine, heavy_imports
 from tcs.service.heavy_imports import import_heavy
 from tcs.service.http import Access, Server, make_application
 from tcs.service.preparation import Preparation
@@ -72,6 +72,17 @@ def test_a_job_waits_for_what_is_being_built(monkeypatch):
     assert len(scorers.built) == 1
 
 
+def test_scoring_waits_for_nothing_that_draws(monkeypatch):
+    Scorers(monkeypatch)
+    imported: list[str] = []
+    monkeypatch.setattr(heavy_imports, "_import", imported.append)
+    with Engine() as engine:
+        assert here(engine) == "scored"
+        assert imported == ["tcs.placement.scoring"]
+        engine.prepare().wait()
+    assert len(imported) > 2
+
+
 def test_the_scene_is_that_of_the_first_file(monkeypatch, tmp_path):
     scorers = Scorers(monkeypatch)
     path = tmp_path / "example.tcs"
@@ -100,9 +111,16 @@ def test_a_step_that_fails_is_the_last(error):
         done.append("fails")
         raise error("too little")
 
-    preparation = Preparation([fails, lambda: done.append("next")])
+    preparation = Preparation([fails, lambda: done.append("next")], lambda: done.append("ready"))
     preparation.wait()
-    assert done == ["fails"]
+    assert done == ["fails", "ready"]
+
+
+def test_it_says_when_everything_is_done():
+    done = []
+    steps = [lambda: done.append("first"), lambda: done.append("second")]
+    Preparation(steps, lambda: done.append("ready")).wait()
+    assert done == ["first", "second", "ready"]
 
 
 def test_it_stops_after_the_present_step():
@@ -113,7 +131,7 @@ def test_it_stops_after_the_present_step():
         may_end.wait(30.0)
         done.append("slow")
 
-    preparation = Preparation([slow, lambda: done.append("next")])
+    preparation = Preparation([slow, lambda: done.append("next")], lambda: done.append("ready"))
     assert begun.wait(30.0)
     threading.Timer(0.1, may_end.set).start()
     preparation.stop()

@@ -2,7 +2,7 @@
 
 import { cancel, ended, post } from "./api.js";
 import { by, made, options } from "./panels.js";
-import { named, setting, t } from "./texts.js";
+import { modelName, setting, t } from "./texts.js";
 
 const PIECES = ["chair", "table", "cabinet", "wall", "door", "region"];
 const SETTLED = 150; // time after the last change of a key or a slider at which it is scored [ms]
@@ -29,15 +29,21 @@ export class Editing {
   }
 
   // Takes the scene of the file before any change.
-  offer(scene, outlines, saved) {
+  offer(scene, outlines, saved, at) {
     this.scene = scene;
     this.things.scene(scene, outlines);
+    if (at) this.at = this.#settings(JSON.parse(at));
+    if (saved) this.things.restore(saved);
     this.say();
-    if (!saved) return;
-    this.things.restore(saved);
-    this.say();
+    if (!saved && !this.at) return;
     this.map.placeThings();
-    if (this.things.isChanged) this.rescore();
+    if (this.things.isChanged || this.at) this.rescore();
+  }
+
+  // The settings of an address that the sliders have, within their limits; null where one is missing.
+  #settings(at) {
+    const all = this.scene.axes.map(({ name, low, high }) => [name, Math.min(Math.max(at[name], low), high)]);
+    return all.length && all.every(([, value]) => Number.isFinite(value)) ? Object.fromEntries(all) : null;
   }
 
   clear() {
@@ -59,7 +65,7 @@ export class Editing {
 
   #list() {
     const subjects = ["robot", ...this.things.names];
-    options(by("subject"), subjects.map((name) => [name, thingName(name)]), this.map.subject);
+    options(by("subject"), subjects.map((name) => [name, modelName(name)]), this.map.subject);
     this.choose(subjects.includes(this.map.subject) ? this.map.subject : "robot");
   }
 
@@ -285,11 +291,4 @@ export class Editing {
     if (!done.result) throw new Error(done.problem);
     return done.result.file;
   }
-}
-
-// Returns the name of a thing: "chair 2" of chair_2, and the translation of what ships.
-export function thingName(name) {
-  const [, kind, number] = /^(.*?)(?:_(\d+))?$/.exec(name);
-  const text = t(`pieces.${kind}`) ?? named("things", kind);
-  return number ? `${text} ${number}` : text;
 }

@@ -1,10 +1,10 @@
 // The page: what is chosen, and what follows from each change of it.
 
 import { Refusal, cancel, ended, get, post, send } from "./api.js";
-import { Editing, thingName } from "./editing.js";
+import { Editing } from "./editing.js";
 import { FloorMap, paint } from "./map.js";
 import { by, made, offerColours, options, showCards, showExpert, showGoals, showLegend, showStates, showWhy } from "./panels.js";
-import { goalText, load, sentence, t } from "./texts.js";
+import { bodyName, goalText, load, modelName, sentence, t } from "./texts.js";
 import { Things, overlap, turned } from "./things.js";
 import { Playing } from "./playing.js";
 import { View3d } from "./view3d.js";
@@ -67,8 +67,12 @@ async function start() {
   await load(by("language").value);
   say();
   await listFiles(wanted.get("file"));
-  if (page.files.length) await openFile(wanted);
-  else by("words").textContent = t("noFile");
+  if (page.files.length) {
+    await openFile(wanted);
+  } else {
+    by("scoring").open = true;
+    by("words").textContent = t("noFile");
+  }
   document.body.dataset.ready = "yes";
   page.known = await get("v1/list");
   offerTasks();
@@ -91,6 +95,7 @@ function say() {
 async function listFiles(chosen) {
   page.files = (await get("v1/files")).filter((one) => !page.rescored.has(one.file));
   options(by("file"), page.files.map((one) => [one.file, one.title]), chosen);
+  document.body.toggleAttribute("data-empty", !page.files.length);
 }
 
 function offerTasks() {
@@ -129,7 +134,7 @@ async function openFile(wanted = new URLSearchParams()) {
   page.original = opened;
   sceneOf(opened, {}, opened.state).then(() => {
     if (opened !== whole) return;
-    editing.offer(opened.scene, opened.scene.states[opened.state]?.outlines ?? [], wanted.get("changes"));
+    editing.offer(opened.scene, opened.scene.states[opened.state]?.outlines ?? [], wanted.get("changes"), wanted.get("at"));
     showScene();
     if (floor().states.length > 1) sceneOf(opened).then(showScene).catch(fault);
   }).catch(fault);
@@ -268,7 +273,7 @@ function under() {
   const names = new Set();
   for (const { thing, points } of isFree ? map.outlines : []) {
     const there = things.find(thing) ? points.map((point) => things.moved(thing, point)) : points;
-    if (overlap(base, there)) names.add(thingName(thing));
+    if (overlap(base, there)) names.add(modelName(thing));
   }
   by("under").textContent = names.size ? t("under", { things: [...names].join(", ") }) : "";
 }
@@ -301,11 +306,11 @@ async function space() {
   playing.clear();
   by("space").hidden = !view3d.isPossible;
   if (!view3d.isPossible) return;
+  view3d.contact = [];
   const number = page.asked;
   const goal = by("armAt").value;
   const found = await post("posture", { ...placed(), ...(goal ? { goal: Number(goal) } : {}) });
   if (number !== page.asked) return;
-  view3d.contact = [];
   view3d.map(map.canvas, map.painted);
   view3d.scene(found, page.outcome.goals);
   if (page.lookedAt !== file().file) view3d.look(found.goals, [map.pose.x, map.pose.y]);
@@ -360,6 +365,7 @@ function show(outcome) {
   under();
   const hash = { file: file().file, state: view === whole ? view.state : 0, x: x.toFixed(3), y: y.toFixed(3), yaw: yaw.toFixed(1), torso: page.torso };
   if (things.isChanged) hash.changes = things.saved();
+  if (editing.at) hash.at = JSON.stringify(editing.at);
   history.replaceState(null, "", `#${new URLSearchParams(hash)}`);
 }
 
@@ -380,16 +386,16 @@ function explained(goal) {
 
 async function why(goal) {
   const explanation = await explained(goal);
-  view3d.contact = goal.pair ?? [];
+  view3d.contact = (goal.pair ?? []).map((name) => ({ name, text: bodyName(name, (thing) => things.find(thing)) }));
   view3d.draw();
-  showWhy(goal, explanation, page.outcome.goals, (fix) => go(fix.members[0]));
+  showWhy(goal, explanation, page.outcome.goals, view3d.contact.map(({ text }) => text), (fix) => go(fix.members[0]));
 }
 
 async function fixOf(goal) {
   const explanation = await explained(goal);
   const fix = explanation.nearest_reaching;
   if (fix) await go(fix.members[0]);
-  else showWhy(goal, explanation, page.outcome.goals, () => {});
+  else showWhy(goal, explanation, page.outcome.goals, [], () => {});
 }
 
 // Goes to a configuration: its base pose, torso height and state of the environment.
@@ -468,6 +474,7 @@ async function changeLanguage() {
   localStorage.setItem("tcs-language", by("language").value);
   await load(by("language").value);
   say();
+  if (!page.files.length) by("words").textContent = t("noFile");
   if (!page.outcome) return;
   show(page.outcome);
   listStates();
@@ -500,6 +507,6 @@ for (const id of ["alpha", "beta", "gamma"]) by(id).onchange = () => { showExper
 by("armAt").onchange = () => space().catch(fault);
 by("share").onclick = async () => {
   await navigator.clipboard?.writeText(location.href).catch(() => {});
-  by("jobWords").textContent = t("copied");
+  by("shared").textContent = t("copied");
 };
 start().catch(fault);

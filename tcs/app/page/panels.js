@@ -3,6 +3,8 @@
 import { IN_SOME_FILES } from "./map.js";
 import { changes, goalName, goalText, named, setting, t } from "./texts.js";
 
+const SPEED = 0.2; // at which the time to drive is given [m/s]: slow, beside a person
+
 export const by = (id) => document.getElementById(id);
 
 export function made(name, text, parent, attributes = {}) {
@@ -34,14 +36,15 @@ export function showGoals(outcome, onWhy, onFix) {
   }
 }
 
-export function showWhy(goal, explanation, goals, onFix) {
+// `touching` are the names of the bodies that would touch, if any.
+export function showWhy(goal, explanation, goals, touching, onFix) {
   const card = by("why");
   card.hidden = false;
   card.replaceChildren();
   const name = goalName(goal);
   made("h3", t("whyOf", { goal: name }), card);
   made("p", t("whyAnswer", { reason: t(`reasons.${explanation.explained.reason}`) }), card);
-  if (goal.pair) made("p", goal.pair.map((body) => body.split("::").at(-1).replace(/_link$/, "").replaceAll("_", " ")).join(" – "), card);
+  if (touching.length) made("p", touching.join(" – "), card);
   const fix = explanation.nearest_reaching;
   if (!fix) {
     made("p", t("noFix"), card);
@@ -65,7 +68,7 @@ export function showCards(choices, onGo, onShow) {
     const percent = Math.round(100 * choice.reachability);
     const count = choice.members.length;
     made("h3", t(count === 1 ? "onePlace" : "places", { count, percent }), card);
-    made("p", t("travel", { metres: choice.cost.toFixed(1) }), card);
+    made("p", t("travel", { metres: choice.cost.toFixed(1), seconds: Math.round(choice.cost / SPEED), speed: SPEED }), card);
     const axes = choice.moves.map((axis) => named("settings", axis)).join(", ");
     made("p", axes ? t("moves", { axes }) : t("unmoved"), card);
     if (choice.success !== undefined) {
@@ -100,10 +103,9 @@ export function showLegend(score) {
   scale.append(`${t(`legend.${score}.low`)} `);
   made("span", undefined, scale, { class: "scale" });
   scale.append(t(`legend.${score}.high`));
-  const unknown = IN_SOME_FILES.includes(score) ? [["unknown", "unknown"]] : [];
-  for (const [name, colour] of [...unknown, ["blocked", "blocked"], ["person", "person"], ["furniture", "furniture"], ["goal", "goal"]]) {
+  for (const name of [IN_SOME_FILES.includes(score) ? "unknown" : "zero", "blocked", "person", "furniture", "goal"]) {
     const item = made("li", undefined, list);
-    made("span", undefined, item, { class: colour });
+    made("span", undefined, item, { class: name });
     item.append(t(`legend.${name}`));
   }
 }

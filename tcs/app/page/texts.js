@@ -24,6 +24,26 @@ export function goalName(goal) {
   return t("goalName", { frame: named("frames", goal.body_frame), place: goal.place });
 }
 
+// The name of a body for readers: "left forearm (robot)" of l_forearm_link, "left upper arm (person)" of person::arm_left_link. Without a
+// model before it, it is of the robot, or a thing of the scene, as `isThing` says of its name.
+export function bodyName(body, isThing) {
+  const [name, model = "robot"] = body.split("::").reverse();
+  if (name === body && isThing(name.replace(/_[bc]$/, ""))) return modelName(name.replace(/_[bc]$/, ""));
+  const sides = { l: "left", left: "left", r: "right", right: "right" };
+  const words = name.replace(/_link$/, "").split(/[_ ]/).map((word) => sides[word] ?? word);
+  const isSide = (word) => word === "left" || word === "right";
+  const part = words.filter((word) => !isSide(word)).join(" ");
+  const text = t(`bodies.${model}.${part}`) ?? part;
+  return t("bodyOf", { side: words.filter(isSide).slice(0, 1).map((word) => `${t(`bodySides.${word}`)} `).join(""), part: text, model: modelName(model) });
+}
+
+// The name of a thing of the scene: "chair 2" of chair_2.
+export function modelName(name) {
+  const [, kind, number] = /^(.*?)(?:_(\d+))?$/.exec(name);
+  const text = t(`pieces.${kind}`) ?? named("things", kind);
+  return number ? `${text} ${number}` : text;
+}
+
 // The name of a goal with its number, by which the map and the command line name it.
 export function goalText(goal) {
   const name = goalName(goal);

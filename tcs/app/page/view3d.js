@@ -6,6 +6,7 @@ import { cornersOf } from "./solids.js";
 const COLOURS = {
   robot: [0.8, 0.82, 0.85], arm: [0.62, 0.66, 0.71], person: [0.89, 0.65, 0.5], furniture: [0.48, 0.53, 0.58], contact: [0.85, 0.2, 0.1],
 };
+const NAMES = "#8c1d0f"; // of bodies that touch
 const FIELD = 0.7; // vertical field of view [rad]
 const NEAR = 0.05;
 const FAR = 40;
@@ -43,6 +44,15 @@ function product(a, b) {
   const found = new Array(16).fill(0);
   for (let i = 0; i < 4; i++) for (let j = 0; j < 4; j++) for (let k = 0; k < 4; k++) found[4 * j + i] += a[4 * k + i] * b[4 * j + k];
   return found;
+}
+
+// Returns the middle of the corners of triangles, each a position and a normal.
+function middleOf(corners) {
+  return [0, 1, 2].map((k) => {
+    let [least, most] = [Infinity, -Infinity];
+    for (let i = k; i < corners.length; i += 6) [least, most] = [Math.min(least, corners[i]), Math.max(most, corners[i])];
+    return (least + most) / 2;
+  });
 }
 
 const STILL = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
@@ -117,7 +127,7 @@ export class View3d {
         if (!parts.has(name)) parts.set(name, { body: shape.body, name: shape.name, category: shape.category, corners: [] });
         for (const number of cornersOf(shape)) parts.get(name).corners.push(number);
       }
-      this.groups = [...parts.values()].map(({ corners, ...rest }) => ({ ...rest, ...this.#buffer(corners) }));
+      this.groups = [...parts.values()].map(({ corners, ...rest }) => ({ ...rest, middle: middleOf(corners), ...this.#buffer(corners) }));
       this.key = key;
     }
     [this.goals, this.outcomes, this.frame] = [found.goals, outcomes, found.frames[0]];
@@ -169,7 +179,7 @@ export class View3d {
     this.#part(this.floor, STILL, [1, 1, 1]);
     gl.uniform1f(places.is_floor, 0);
     for (const group of this.groups) {
-      const colour = this.contact.includes(group.name) ? COLOURS.contact : COLOURS[group.category];
+      const colour = this.contact.some(({ name }) => name === group.name) ? COLOURS.contact : COLOURS[group.category];
       this.#part(group, pose(this.frame[group.body]), colour);
     }
     this.#number(camera, density);
@@ -188,17 +198,46 @@ export class View3d {
     gl.drawArrays(gl.TRIANGLES, 0, count);
   }
 
+  // Returns where a point of space is on the marks [px], null behind the camera.
+  #seen(camera, point) {
+    const [x, y, , w] = [0, 1, 2, 3].map((row) => [...point, 1].reduce((sum, value, k) => sum + camera[4 * k + row] * value, 0));
+    return w > 0 ? [((x / w + 1) / 2) * this.marks.width, ((1 - y / w) / 2) * this.marks.height] : null;
+  }
+
+  // Names of the bodies that touch, one below the other at the top, each with a line to its body.
+  #names(camera, context, density) {
+    Object.assign(context, { lineWidth: 1.5 * density, strokeStyle: NAMES });
+    this.contact.forEach(({ name, text }, i) => {
+      const group = this.groups.find((one) => one.name === name);
+      const body = group && pose(this.frame[group.body]);
+      const middle = body && [0, 1, 2].map((row) => [...group.middle, 1].reduce((sum, value, k) => sum + body[4 * k + row] * value, 0));
+      const at = middle && this.#seen(camera, middle);
+      if (!at) return;
+      const half = context.measureText(text).width / 2 + 6 * density;
+      const [x, y] = [Math.min(Math.max(at[0], half), this.marks.width - half), (16 + 24 * i) * density];
+      context.beginPath();
+      context.moveTo(x, y);
+      context.lineTo(...at);
+      context.stroke();
+      context.fillStyle = "#fff";
+      context.fillRect(x - half, y - 10 * density, 2 * half, 20 * density);
+      context.fillStyle = NAMES;
+      context.fillText(text, x, y);
+    });
+  }
+
   // Numbers of the goals over everything: discs where reached, squares where not.
   #number(camera, density) {
     const { marks } = this;
     [marks.width, marks.height] = [this.canvas.width, this.canvas.height];
     const context = marks.getContext("2d");
-    Object.assign(context, { font: `bold ${13 * density}px system-ui, sans-serif`, textAlign: "center", textBaseline: "middle", lineWidth: 1.5 * density, strokeStyle: "#fff" });
+    Object.assign(context, { font: `bold ${13 * density}px system-ui, sans-serif`, textAlign: "center", textBaseline: "middle" });
     const size = 10 * density;
+    this.#names(camera, context, density);
+    context.strokeStyle = "#fff";
     const seen = this.goals.map((goal, number) => {
-      const [x, y, , w] = [0, 1, 2, 3].map((row) => camera[row] * goal[0] + camera[4 + row] * goal[1] + camera[8 + row] * goal[2] + camera[12 + row]);
-      const at = [((x / w + 1) / 2) * marks.width, ((1 - y / w) / 2) * marks.height];
-      return w > 0 && { at, number, reached: Boolean(this.outcomes[number]?.reached) };
+      const at = this.#seen(camera, goal.slice(0, 3));
+      return at && { at, number, reached: Boolean(this.outcomes[number]?.reached) };
     });
     for (const { at, text, reached, count } of grouped(seen.filter(Boolean), 1.6 * size)) {
       const half = size * count;

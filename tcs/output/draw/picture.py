@@ -23,6 +23,8 @@ _TITLE_WIDTH = 66
 """Characters of the title per line above a view."""
 _CAPTION_WIDTH = 74
 """Characters of a caption per line."""
+_WIDTH, _HEIGHT, _LINE = 6.6, 6.0, 0.2
+"""Width of a panel, its height without the caption, and height of a line of that [inch]."""
 _GOALS_APART = 12.0
 """Distance below which goals share one mark [px]: about its width."""
 _UNHIDDEN = 0.6
@@ -69,7 +71,7 @@ def draw_scene(views: Sequence[ScenePanel], *, title: str) -> Figure:
         views: The panels, left to right.
         title: First line; "" for none.
     """
-    figure = Figure(figsize=(6.6 * len(views), 6.6), layout="constrained")
+    figure = Figure(figsize=(_WIDTH * len(views), _WIDTH), layout="constrained")
     panels = figure.subplots(1, len(views), squeeze=False)[0]
     for axes, view in zip(panels, views, strict=True):
         image, is_whole, camera = _render(view)
@@ -78,9 +80,14 @@ def draw_scene(views: Sequence[ScenePanel], *, title: str) -> Figure:
             at = cameras.pixels_of(camera, np.array([mark.position for mark in view.goals]))
             draw_goal_marks(axes, view.goals, (at - 0.5) / 2.0, apart=_GOALS_APART)
         axes.set_axis_off()
+        # In the middle, lines above the picture may be beyond the edge.
+        axes.set_anchor("S")
         lines = [*view.caption.splitlines(), *([] if is_whole else [f"({_LEFT_OUT})"])]
         wrapped = [part for line in lines for part in textwrap.wrap(line, _CAPTION_WIDTH)]
         axes.set_title("\n".join(wrapped), fontsize=11)
+        # A long caption makes the figure higher: its first lines would be cut off.
+        height = max(float(figure.get_figheight()), _HEIGHT + _LINE * len(wrapped))
+        figure.set_figheight(height)
     if title:
         width = _TITLE_WIDTH * len(views)
         lines = [line for part in title.splitlines() for line in textwrap.wrap(part, width)]

@@ -46,10 +46,12 @@ def as_html(page: Page) -> str:
             f"<style>\n{style}</style>",
             "</head>",
             "<body>",
+            "<main>",
             f"<h1>{escape(page.title)}</h1>",
             f'<p class="lead">{escape(page.lead)}</p>',
             f"<nav>{links}</nav>",
             *(_section(section) for section in page.sections),
+            "</main>",
             foot,
             "</body>",
             "</html>",
@@ -80,7 +82,8 @@ def _(block: Bullets) -> str:
 
 @_written.register
 def _(block: Code) -> str:
-    return f"<pre><code>{escape(block.text)}</code></pre>"
+    # What can be scrolled must be reached with the keyboard.
+    return f'<pre tabindex="0"><code>{escape(block.text)}</code></pre>'
 
 
 @_written.register
@@ -101,7 +104,7 @@ def _(block: Table) -> str:
     # The caption stays in place when a wide table is scrolled on a phone.
     return (
         f'<figure class="table">\n<figcaption>{escape(block.caption)}</figcaption>\n'
-        f'<div class="scroll"><table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n'
+        f'<div class="scroll" tabindex="0"><table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n'
         + "\n".join(rows)
         + "\n</tbody></table></div>\n</figure>"
     )

@@ -28,6 +28,8 @@ from tcs.output.view.viewed_set import ViewedSet
 from tcs.output.words import REASON_COLOURS, REASON_NAMES, goals_text
 from tcs.placement.tables import Reason
 
+VIEWPORT = '<meta name="viewport" content="width=device-width, initial-scale=1">'
+"""Pixels of a phone are those of its screen."""
 _RATE = 10
 """Frames per second; a change takes one frame."""
 _HOLD = 15
@@ -112,7 +114,7 @@ def export_page(
     if len(shots) > 1:
         meshcat.SetAnimation(_animation(shots, visible))
     panel = _panel(title, [*_captions(viewed, steps), *notes], plays=len(shots) > 1)
-    return str(meshcat.StaticHtml()).replace("</body>", f"{panel}\n</body>", 1)
+    return static_page(meshcat, panel)
 
 
 def _animation(shots: list[Snapshot], visible: list[set[str]]) -> MeshcatAnimation:
@@ -195,6 +197,12 @@ def _gradient() -> str:
         '<span style="display:inline-block;width:7em;height:.8em;border:1px solid #555;'
         f'background:linear-gradient(90deg,{stops})"></span>'
     )
+
+
+def static_page(meshcat: Meshcat, panel: str) -> str:
+    """Return what a Meshcat shows as one page, with HTML over it; on a phone too."""
+    page = str(meshcat.StaticHtml()).replace("<head>", f"<head>{VIEWPORT}", 1)
+    return page.replace("</body>", f"{panel}\n</body>", 1)
 
 
 def overlay(title: str, lines: Sequence[str], more: str = "", *, plays: bool = False) -> str:

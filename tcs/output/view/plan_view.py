@@ -18,7 +18,7 @@ from tcs.motion import MotionPlan, StopPlan
 from tcs.motion.plan_check import check_names
 from tcs.output.report.score.pictures import job_title
 from tcs.output.view.animation import play_poses, play_visible
-from tcs.output.view.export import overlay, swatch
+from tcs.output.view.export import overlay, static_page, swatch
 from tcs.output.view.live import open_meshcat, stay_open, wait
 from tcs.output.view.scene_objects import SceneShapes, arrow_path
 from tcs.output.view.swept import swept_mesh
@@ -164,7 +164,7 @@ def write_plan_view(view: PlanView, path: Path) -> dict[str, Any]:
         for one, text in ((_DONE, "done"), (_NOT_DONE, "not done"))
     )
     panel = overlay(view.title, notes, f"<p>{colours}</p>", plays=True)
-    page = str(meshcat.StaticHtml()).replace("</body>", f"{panel}\n</body>", 1).encode()
+    page = static_page(meshcat, panel).encode()
     with whole_file(path, "Page") as stream:
         stream.write(page)
     return {

@@ -22,6 +22,8 @@ _LANDMARKS = {
     "foot": "feet",
 }
 """Parts of the body by the start of the names of their frames; a calf begins at the knee."""
+_MOST_KEPT = 1000
+"""Most places of members whose words are kept with a table."""
 _SEATED = ("hips", "knees", "feet")
 """Parts that a robot can be beside where the person sits."""
 _BESIDE = 0.3
@@ -155,16 +157,20 @@ def member_places(
             configurations that they were refined from, whose state of the environment is taken.
     """
     grid = file.configurations
+    # The members of the best sets are few: from most places they are the same.
+    kept = file.tables[table].derived.setdefault("places in words", {})
     texts = []
     for member, index in zip(
         members or [grid.configuration(h) for h in indices], indices, strict=True
     ):
-        person = _person_of(file, table, int(grid.state_of(index)))
-        texts.append(
-            ""
-            if person is None
-            else person.place(member.base_x, member.base_y, member.base_yaw).text
-        )
+        pose = (member.base_x, member.base_y, member.base_yaw)
+        text = kept.get((*pose, index))
+        if text is None:
+            person = _person_of(file, table, int(grid.state_of(index)))
+            text = "" if person is None else person.place(*pose).text
+            if len(kept) < _MOST_KEPT:
+                kept[(*pose, index)] = text
+        texts.append(text)
     return texts
 
 

@@ -90,7 +90,10 @@ def _add_operation(app: FastAPI, engine: Engine, operation: Operation, queues: F
         content = await _json_of(request)
         checked_request: Any = checked(content, operation.request, "request", DataFileError)
         if operation.takes_turns:
-            text = await queues.run(checked_request.file, lambda: _text(answer(checked_request)))
+            kind = (operation.name, frozenset(checked_request.model_fields_set))
+            text = await queues.run(
+                checked_request.file, kind, lambda: _text(answer(checked_request))
+            )
             return Response(text, media_type=_JSON)
         result = await anyio.to_thread.run_sync(answer, checked_request)
         if isinstance(result, JobStatus):

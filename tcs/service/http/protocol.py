@@ -13,11 +13,14 @@ class BoundedProtocol(HttpToolsProtocol):
 
     _waits_for_head = True
     _head_bytes = 0
+    _has_ended = False
 
     def data_received(self, data: bytes) -> None:
         """Read a part of a request, or close the connection."""
+        self._has_ended = False
         super().data_received(data)
-        if not self._waits_for_head:
+        # After the end of a request, the part is mostly its content.
+        if not self._waits_for_head or self._has_ended:
             return
         self._head_bytes += len(data)
         if self._head_bytes > MOST_HEAD_BYTES and not self.transport.is_closing():
@@ -30,5 +33,5 @@ class BoundedProtocol(HttpToolsProtocol):
 
     def on_message_complete(self) -> None:
         """End a request; the headers of another one may follow."""
-        self._waits_for_head = True
+        self._waits_for_head = self._has_ended = True
         super().on_message_complete()

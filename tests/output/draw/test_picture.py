@@ -1,5 +1,8 @@
+import dataclasses
+
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 
 from tcs.kernel.arrays import BOX, SPHERE
@@ -126,6 +129,19 @@ def test_one_panel_for_each_view_and_a_legend():
     assert len(figure.axes) == 2
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels == [Category.ARM.label, Category.CURRENT_GOAL.label]
+
+
+@pytest.mark.parametrize("title", ["", "A title"])
+@pytest.mark.parametrize("lines", [1, 3, 5])
+def test_captions_are_not_cut_off(title, lines, monkeypatch):
+    monkeypatch.setattr("tcs.output.draw.camera.SIZE", (300, 260))  # of the proportions of pictures
+    one = view(sphere(Category.ARM, [0, 0, 1]))
+    long = dataclasses.replace(one, caption="\n".join(["stop 1: serves one goal"] * lines))
+    figure = draw_scene([long, one], title=title)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    for axes in figure.axes:
+        assert axes.title.get_window_extent(canvas.get_renderer()).y1 < figure.bbox.y1
 
 
 def test_solids_behind_the_camera_are_left_out():

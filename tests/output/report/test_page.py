@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from html.parser import HTMLParser
+from importlib.resources import files
 
 import pytest
 
@@ -121,3 +122,35 @@ def test_markdown_has_every_table_and_no_sign_that_means_something(everything):
     assert all(len(re.findall(r"(?<!\\)\|", row)) == 3 for row in rows)
     assert re.search(r"(?<!\\)<script", text.replace("```sh\n" + HOSTILE, "")) is None
     assert text.startswith("# A title\n\nThe lead.\n\n## One: first\n")
+
+
+def test_what_can_be_scrolled_is_reached_with_the_keyboard(everything):
+    html = as_html(everything)
+    assert html.count("<pre") == html.count('<pre tabindex="0">') == 1
+    assert html.count('class="scroll"') == html.count('class="scroll" tabindex="0"') == 2
+
+
+def contrast(one, other):
+    """Contrast of two colours #rrggbb, WCAG 2.2."""
+
+    def luminance(colour):
+        parts = [int(colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5)]
+        linear = [p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts]
+        return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_text_has_contrast_on_every_ground(scheme):
+    style = files("tcs.output.report").joinpath("page.css").read_text(encoding="utf-8")
+    light, dark = style.split("@media screen and (prefers-color-scheme: dark)")
+    part = light if scheme == "light" else dark
+    colour = dict(re.findall(r"--(ink|quiet|blue|band): (#[0-9a-f]{6})", part))
+    tones = re.findall(r"td\.(?:good|bad) \{ color: (#[0-9a-f]{6})", part)
+    assert len(tones) == 2
+    ground = {"light": "#ffffff", "dark": "#15191d"}[scheme]
+    assert f"background: {ground.replace('#ffffff', '#fff')}" in part
+    for text in (colour["ink"], colour["quiet"], colour["blue"], *tones):
+        assert min(contrast(text, on) for on in (ground, colour["band"])) >= 4.5

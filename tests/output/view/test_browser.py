@@ -70,20 +70,22 @@ def test_sliders_and_keys_change_what_the_arrows_show(live, viewer, shaving_set)
     from selenium.webdriver import ActionChains
 
     live.driver.execute_script("viewer.gui.open()")
-    names = live.driver.execute_script("return Object.keys(viewer.gui_controllers)")
-    assert {"set member", "goal", "base x [m]", "heading [deg]"} <= set(names)
+    wanted = {"set member", "goal", "base x [m]", "heading [deg]"}
+    names = "return Object.keys(viewer.gui_controllers)"
+    # Controls arrive after the scene.
+    live.wait(lambda: wanted <= set(live.driver.execute_script(names)))
     before = live.arrows()
     slider = controller(live, "base x [m]")
     live.driver.execute_script("arguments[0].scrollIntoView()", slider)
     right = slider.size["width"] // 2 - 3
     ActionChains(live.driver).move_to_element_with_offset(slider, right, 0).click().perform()
-    live.wait(viewer.look)
+    live.wait(viewer.update)
     there = int(shaving_set.grid.flat(viewer.state.along))
     assert shaving_set.grid.configuration(there).base_x == pytest.approx(-0.1)
     live.wait(lambda: live.arrows() == expected(shaving_set, there))
     assert live.arrows() != before
     goal = viewer.state.goal
     ActionChains(live.driver).send_keys("g").perform()
-    live.wait(viewer.look)
+    live.wait(viewer.update)
     assert viewer.state.goal == (goal + 1) % shaving_set.goals
     assert live.complaints() == []

@@ -37,6 +37,8 @@ def test_page_states_what_it_is_and_fits_into_four_megabytes(objects, shaving_se
     for entry in ("Arrows: ", "goal shown", "where the base stands", "scored arm"):
         assert entry in text
     assert text.count('id="tcs-pause"') == 1
+    head = text[: text.index("</head>")]
+    assert head.count('name="viewport" content="width=device-width') == 1
     assert "By &lt;no one&gt;." in text
     assert text.count("</body>") == 1
     assert len(text.encode()) < 4e6

@@ -8,10 +8,19 @@ function showCamera(box, name, number) {
   const figure = document.createElement("figure");
   const image = document.createElement("img");
   const caption = document.createElement("figcaption");
-  image.alt = name;
+  const enlarge = element("button", { type: "button", "aria-pressed": "false" }, image);
+  image.alt = `${name}, large or small`;
   caption.textContent = name;
-  figure.append(caption, image);
+  figure.append(caption, enlarge);
   box.append(figure);
+  enlarge.addEventListener("click", () => {
+    // One at a time.
+    for (const other of box.children) {
+      const isLarge = other === figure && !other.classList.contains("large");
+      other.classList.toggle("large", isLarge);
+      other.querySelector("button").setAttribute("aria-pressed", isLarge);
+    }
+  });
   let arrived = performance.now();
   const next = () => {
     image.src = `camera/${number}?${performance.now()}`;

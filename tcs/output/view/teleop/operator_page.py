@@ -20,6 +20,7 @@ from importlib.resources import files
 from typing import Any
 
 from tcs.errors import OutputError
+from tcs.output.view.export import VIEWPORT
 from tcs.output.view.teleop.controls import (
     MOVES,
     OTHERS,
@@ -44,8 +45,6 @@ _HTML, _TITLE = "<html>", "<title>Drake MeshCat</title>"
 _FILES = ("operator_page.css", "operator_desk.js", "operator_page.js")
 _MOST_BYTES = 4096
 """Most bytes of a message of the page."""
-_VIEWPORT = '<meta name="viewport" content="width=device-width, initial-scale=1">'
-"""Pixels of a phone are those of its screen."""
 _LOG = logging.getLogger(__name__)
 Pictures = Callable[[], Mapping[str, bytes]]
 
@@ -80,7 +79,7 @@ def operator_html(meshcat_port: int, desk: Mapping[str, Any], *, cameras: bool, 
     url = f"http://localhost:{meshcat_port}/"
     page = page.replace(_SCRIPT, _SCRIPT + url)
     page = page.replace(_ADDRESS, f"url = {json.dumps(url)};")
-    page = page.replace("<head>", f"<head>{_VIEWPORT}", 1)
+    page = page.replace("<head>", f"<head>{VIEWPORT}", 1)
     return page.replace(
         _END, f"<style>{style}</style><script>const TCS = {settings};\n{script}</script>{_END}"
     )

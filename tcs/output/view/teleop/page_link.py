@@ -4,6 +4,9 @@ The page sends a message some twenty times a second, and at once when a key goes
 names the keys that are held, so that a key counts until it is released, and no longer: silence of
 the page counts as the release of all its keys. A page whose machine slept may have missed a
 release: after a long silence its keys count only once they were released.
+
+A browser may keep a page that was left, its connection to Meshcat open and its sliders where they
+were: an operator is there only while a page is heard.
 """
 
 from __future__ import annotations
@@ -20,6 +23,9 @@ from tcs.output.view.teleop.panel import Readout
 SILENCE = 0.3
 """Time without a message after which all keys of a page count as released [s]: six messages. At the
 greatest speed of keys the tool moves 7 cm in it."""
+ABSENCE = 1.0
+"""Silence of all pages after which no operator is there [s]: when a page itself says that it has no
+connection. Shorter, and a browser that is slow to draw would stop the arm."""
 LONG_SILENCE = 2.0
 """Silence after which a key that is still held has no effect until it is released [s]."""
 _MOST_PAGES = 8
@@ -110,6 +116,12 @@ class PageLink:
                 self._clicks[self._name[code]] += max(count - page.clicks.get(code, 0), 0)
         page.clicks = clicks
 
+    def is_heard(self) -> bool:
+        """Return whether any page has sent a message lately."""
+        now = self._clock()
+        with self._lock:
+            return any(now - page.at <= ABSENCE for page in self._pages.values())
+
     def held(self) -> frozenset[str]:
         """Return the names of the buttons whose keys are held now."""
         now = self._clock()
@@ -144,7 +156,8 @@ class PageControls:
         """Return the present state of the controls."""
         reading, more = self._meshcat.read(), self._link.clicks()
         clicks = {name: count + more.get(name, 0) for name, count in reading.clicks.items()}
-        return replace(reading, clicks=clicks, held=self._link.held())
+        watched = reading.watched and self._link.is_heard()
+        return replace(reading, clicks=clicks, held=self._link.held(), watched=watched)
 
     def zero(self) -> None:
         """Reset every slider of a rate to zero."""

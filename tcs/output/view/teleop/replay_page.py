@@ -11,7 +11,7 @@ from pydrake.geometry import Meshcat, MeshcatAnimation
 
 from tcs.files.writing import whole_file
 from tcs.output.view.animation import interpolation_keys, play_visible
-from tcs.output.view.export import overlay
+from tcs.output.view.export import overlay, static_page
 from tcs.output.view.live import open_meshcat
 from tcs.output.view.teleop.panel import (
     COLOURS,
@@ -107,7 +107,7 @@ def replay_page(
     _play_lines(animation, panel, readouts)
     meshcat.SetAnimation(animation)
     text = overlay(title, notes, plays=True)
-    return str(meshcat.StaticHtml()).replace("</body>", f"{text}\n</body>", 1)
+    return static_page(meshcat, text)
 
 
 def _play_bars(animation: MeshcatAnimation, arm: Arm, readouts: list[Readout]) -> None:

@@ -199,15 +199,6 @@ def test_a_gamepad_drives_and_the_arm_stops_when_it_is_lost(page, browser, reaso
     assert page.last.reason == ""
 
 
-def test_a_closed_browser_stops_the_arm(page, browser):
-    slide(browser, page, "move y [m/s]", 0.1)
-    browser.driver.get("about:blank")
-    until(page, lambda: page.last.reason)
-    assert "no browser" in page.last.reason
-    page.run(0.3)
-    assert not page.last.rates.any()
-
-
 def test_the_page_of_a_run_needs_no_server(browser, iiwa, iiwa_display, driven, tmp_path):
     film = RunView(iiwa, driven)
     path = tmp_path / "run.html"

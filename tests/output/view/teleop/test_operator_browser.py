@@ -109,6 +109,16 @@ def test_a_page_that_is_left_releases_its_keys(page, browser, how):
     assert at_rest(page)
 
 
+def test_a_page_that_is_left_stops_what_its_sliders_move(page, browser):
+    browser.driver.execute_script("viewer.gui_controllers['move y [m/s]'].setValue(0.1)")
+    before = page.page.last.p.copy()
+    until(page, lambda: (page.page.last.p - before)[1] > 0.01)
+    browser.driver.get("about:blank")
+    until(page, lambda: "no browser" in page.page.last.reason, patience=5.0)
+    page.page.run(0.3)
+    assert not page.page.last.rates.any()
+
+
 def test_keys_of_the_page_are_held_by_a_finger_or_the_mouse(page, browser):
     before = page.page.last.p.copy()
     script = """
@@ -121,6 +131,66 @@ def test_keys_of_the_page_are_held_by_a_finger_or_the_mouse(page, browser):
     until(page, lambda: (page.page.last.p - before)[2] > 0.03)
     browser.driver.execute_script(script, "pointerup")
     assert at_rest(page)
+
+
+CAMERAS = """
+const scene = document.getElementById("meshcat-pane").getBoundingClientRect();
+return [...document.querySelectorAll("#cameras figure:has(img)")].map(one => {
+  const box = one.getBoundingClientRect();
+  return [box.width * box.height / (scene.width * scene.height), box.bottom < scene.bottom];
+});
+"""
+
+
+@pytest.mark.parametrize("size", SIZES, ids=["desktop", "phone"])
+def test_camera_pictures_leave_the_scene_free(browser, size):
+    options = LiveOptions(robot="iiwa7", cameras=True)
+    session = LiveSession(options, port=None, on_stop=lambda _: None, record=False)
+    width, height = size
+    screen = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width == 390}
+    script = browser.driver.execute_script
+    try:
+        browser.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", screen)
+        browser.open(session.url, "tool")
+        session.begin()
+        until(session, lambda: len(script(CAMERAS)) == 2, patience=120.0)
+        session.page.run(0.5)
+        small = script(CAMERAS)
+        assert sum(share for share, _ in small) < 0.25
+        assert all(is_inside for _, is_inside in small)
+        for enlarged in (0, 1):
+            script("document.querySelectorAll('#cameras button')[arguments[0]].click()", enlarged)
+            session.page.run(0.2)
+            now = script(CAMERAS)
+            assert now[enlarged][0] > 2.0 * small[enlarged][0]
+            assert now[1 - enlarged][0] <= 1.01 * small[1 - enlarged][0]
+            assert all(is_inside for _, is_inside in now)
+    finally:
+        browser.driver.get("about:blank")
+        session.close()
+
+
+STALL = """
+const until = performance.now() + arguments[0];
+const fetched = window.fetch;
+window.fetch = (...of) => { window.fetch = fetched; const reply = fetched(...of);
+  while (performance.now() < until) {} return reply; };
+window.said = [];
+const line = document.getElementById("message");
+new MutationObserver(() => said.push(line.textContent)).observe(line, {childList: true});
+"""
+
+
+def test_a_page_that_stood_still_has_not_lost_its_connection(page, browser, monkeypatch):
+    browser.driver.execute_script(STALL, 1.8 * 1000.0)
+    page.page.run(1.5)
+    lost = "return said.filter(text => text.startsWith('No connection')).length"
+    assert browser.driver.execute_script(lost) == 0
+    receive = page.link.receive
+    monkeypatch.setattr(page.link, "receive", lambda message: time.sleep(1.2) or receive(message))
+    page.page.run(1.5)
+    monkeypatch.undo()
+    until(page, lambda: browser.driver.execute_script(lost) == 1)
 
 
 def test_modes_are_switched_and_bars_say_their_state(page, browser):

@@ -6,6 +6,7 @@ import pytest
 
 from tcs.output.view.teleop.controls import buttons
 from tcs.output.view.teleop.page_link import (
+    ABSENCE,
     LONG_SILENCE,
     SILENCE,
     LinkError,
@@ -139,6 +140,23 @@ def test_controls_are_those_of_meshcat_and_of_the_page(link, desk):
     assert desk.sliders["move x [m/s]"] > 0.0
     controls.zero()
     assert desk.sliders["move x [m/s]"] == 0.0
+
+
+def test_an_operator_is_there_while_a_page_is_heard(link, desk, clock):
+    controls = PageControls(desk, link)
+    assert not controls.read().watched
+    send = Sender(link)
+    send()
+    assert controls.read().watched
+    clock.now += 0.9 * ABSENCE
+    assert controls.read().watched
+    # A browser may keep the connection to Meshcat of a page that was left.
+    clock.now += 0.2 * ABSENCE
+    assert not controls.read().watched
+    send()
+    assert controls.read().watched
+    desk.watched = False
+    assert not controls.read().watched
 
 
 @pytest.mark.parametrize(
