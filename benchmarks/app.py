@@ -1,13 +1,15 @@
 """Measure the page of `tcs app` in a headless Chromium: opening, clicks, furniture moved, a pose.
 
-Usage: python benchmarks/app.py FILE [--repeats 5] [--clicks 40] [--moves 5] [--seed 0] [--save]
+Usage: python benchmarks/app.py FILE [--repeats 5] [--clicks 40] [--moves 5] [--seed 0]
+    [--poses-only] [--save]
 
 FILE is a score file made by `tcs score`, of an environment with a person. The browser runs before
 the command starts, draws in software, and shares the processor with the server. A click is timed
 in the page, from the event until the words are drawn, one to two seconds after the click before;
-what is moved from the change of its place until the map has another picture. The pose of a person
-is observed over HTTP, by a server that has not scored yet and by the same server again. No kernel
-is compiled while something is measured.
+what is moved from the change of its place until the map has another picture. The pose of a person,
+another one each time, is observed over HTTP: as soon as `tcs serve` says that it is ready, of the
+same server at rest, and once more; and as soon as the page of `tcs app` is usable. No kernel is
+compiled while something is measured.
 """
 
 from __future__ import annotations
@@ -39,6 +41,13 @@ PATIENCE = 60.0
 """Longest wait for the page [s]."""
 SETTLED = 3.0
 """Time until the page rests: cards, the view in space and the other states follow the words [s]."""
+HERE = [1.2, -0.7, 90.0]
+"""Where the robot is that observes: x [m], y [m] and heading [deg]."""
+WHEN = ("as soon as `tcs serve` is ready", "of a server at rest", "once more")
+"""When a pose is observed."""
+WITH_PAGE = "as soon as the page is usable"
+PREPARED = 8.0
+"""Time in which a server prepares what its first job needs [s]."""
 CLICK = """
 const done = arguments[2];
 const [map, words] = ['map', 'words'].map(id => document.getElementById(id));
@@ -85,7 +94,12 @@ def main() -> int:
     command_line.add_argument("--clicks", type=int, default=40)
     command_line.add_argument("--moves", type=int, default=5)
     command_line.add_argument("--seed", type=int, default=0)
+    command_line.add_argument("--poses-only", action="store_true")
     options = command_line.parse_args()
+    if options.poses_only:
+        header("fastapi", "uvicorn")
+        observed(Poses(options), options.repeats)
+        return 0
     found = next((path for name in BROWSERS if (path := shutil.which(name))), None)
     control = shutil.which("chromedriver")
     if found is None or control is None:
@@ -94,12 +108,13 @@ def main() -> int:
     header("fastapi", "uvicorn", "selenium")
     with browser(found, control) as driver:
         row("browser", driver.capabilities["browserVersion"])
-        record("usable after `tcs app`", [opened(driver, options) for _ in range(options.repeats)])
-        with served(options) as url:
+        poses = Poses(options)
+        record("usable after `tcs app`", [opened(driver, poses) for _ in range(options.repeats)])
+        with served("app", options.file) as url:
             usable(driver, url)
             clicks(driver, options)
             moves(driver, options)
-    observed(options)
+    observed(poses, options.repeats)
     save(options)
     return 0
 
@@ -123,16 +138,20 @@ def browser(path: str, control: str) -> Iterator[Any]:
 
 
 @contextlib.contextmanager
-def served(options: argparse.Namespace) -> Iterator[str]:
-    """Run `tcs app` on the file, and yield the address of its page once it is printed."""
+def served(command: str, file: Path) -> Iterator[str]:
+    """Run `tcs app` or `tcs serve` on a file, and yield its address once it is printed."""
+    how = {"app": ["--no-browser"], "serve": ["--port", "0"]}[command]
     process = subprocess.Popen(
-        [sys.executable, "-m", "tcs", "app", str(options.file), "--no-browser"],
+        [sys.executable, "-m", "tcs", command, str(file), *how],
+        stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
     )
     assert process.stderr is not None
     try:
-        yield next(found[0] for line in process.stderr if (found := re.search(r"http://\S+", line)))
+        yield next(
+            found[0] for line in process.stderr if (found := re.search(r"http://[^\s,]+", line))
+        )
     finally:
         process.terminate()
         process.wait()
@@ -145,12 +164,14 @@ def usable(driver: Any, url: str) -> None:
     until(driver, "return document.body.dataset.ready")
 
 
-def opened(driver: Any, options: argparse.Namespace) -> float:
+def opened(driver: Any, poses: Poses) -> float:
     """Return the time from the start of the command until its page is usable [s]."""
     begun = time.perf_counter()
-    with served(options) as url:
+    with served("app", poses.file) as url:
         usable(driver, url)
-        return time.perf_counter() - begun
+        seconds = time.perf_counter() - begun
+        poses.observe(url, WITH_PAGE)
+        return seconds
 
 
 def clicks(driver: Any, options: argparse.Namespace) -> None:
@@ -180,32 +201,60 @@ def moves(driver: Any, options: argparse.Namespace) -> None:
     record(f"{thing} moved until the state is scored in full", whole)
 
 
-def observed(options: argparse.Namespace) -> None:
-    """Measure an observed pose until a set is chosen, over HTTP, in a new server and later."""
-    import httpx
+def observed(poses: Poses, repeats: int) -> None:
+    """Measure the start of `tcs serve`, and observed poses until a set is chosen, over HTTP."""
+    started = []
+    for _ in range(repeats):
+        begun = time.perf_counter()
+        with served("serve", poses.file) as url:
+            started.append(time.perf_counter() - begun)
+            for when in WHEN:
+                if when == WHEN[1]:
+                    time.sleep(PREPARED)
+                poses.observe(url, when)
+    record("`tcs serve` is ready", started)
+    for name, seconds in poses.taken.items():
+        record(name, seconds)
 
-    file = load_scores(options.file)
-    request = {key: file.metadata[key] for key in ("task", "environment", "robot")}
-    frame, at = next(iter(file.body_frames.items()))
-    state = np.ravel(at)[:3].tolist()
-    rng, first, later = random.Random(options.seed), [], []
-    for _ in range(options.repeats):
-        with (
-            served(options) as url,
-            httpx.Client(base_url=url, trust_env=False, timeout=PATIENCE) as http,
-        ):
-            for taken in (first, later):
-                pose = [value + rng.uniform(-0.01, 0.01) for value in state]
-                begun = time.perf_counter()
-                job = http.post("/v1/score-here", json={**request, "frames": {frame: pose}}).json()
-                with http.stream("GET", f"/v1/jobs/{job['job']}/events") as events:
-                    *_, end = (line for line in events.iter_lines() if line.startswith("data:"))
-                done = json.loads(end.removeprefix("data:"))["result"]["file"]
-                here = {"file": done, "here": [1.2, -0.7, 90.0], "at": {}}
-                http.post("/v1/select", json=here).raise_for_status()
-                taken.append(time.perf_counter() - begun)
-    record("observed pose to answer, the first of a server", first)
-    record("observed pose to answer, each later one", later)
+
+class Poses:
+    """Poses of a person around the scored one, none twice, and how long their answers take."""
+
+    def __init__(self, options: argparse.Namespace) -> None:
+        """Observe the first body frame of the file that the options name."""
+        loaded = load_scores(options.file)
+        self.file = options.file
+        self.taken: dict[str, list[float]] = {}
+        self._request = {key: loaded.metadata[key] for key in ("task", "environment", "robot")}
+        self._frame, at = next(iter(loaded.body_frames.items()))
+        self._at = np.ravel(at)[:3].tolist()
+        self._rng = random.Random(options.seed)
+
+    def observe(self, url: str, when: str) -> None:
+        """Measure a pose until a set is chosen.
+
+        A first answer comes from every third base position and where the robot is; the whole
+        follows, timed from the same beginning.
+        """
+        import httpx
+
+        pose = [value + self._rng.uniform(-0.01, 0.01) for value in self._at]
+        request = {**self._request, "frames": {self._frame: pose}}
+        with httpx.Client(base_url=url, trust_env=False, timeout=PATIENCE) as http:
+            begun = time.perf_counter()
+            for what, less in (("first answer", {"every": 3, "around": HERE[:2]}), ("all", {})):
+                answer(http, {**request, **less})
+                name = f"observed pose to {what}, {when}"
+                self.taken.setdefault(name, []).append(time.perf_counter() - begun)
+
+
+def answer(http: Any, request: dict[str, Any]) -> None:
+    """Score an observed scene, and select a set from it."""
+    job = http.post("/v1/score-here", json=request).json()
+    with http.stream("GET", f"/v1/jobs/{job['job']}/events") as events:
+        *_, end = (line for line in events.iter_lines() if line.startswith("data:"))
+    done = json.loads(end.removeprefix("data:"))["result"]["file"]
+    http.post("/v1/select", json={"file": done, "here": HERE, "at": {}}).raise_for_status()
 
 
 def until(driver: Any, script: str) -> None:

@@ -1,24 +1,32 @@
 """Draft a robot file from every URDF of example-robot-data that has an arm, and score with it.
 
-Usage: python benchmarks/drafting.py [--robots ur10,z1] [--coarse] [--jobs 2] [--limit 900]
+Usage: python benchmarks/drafting.py [--robots ur10,z1] [--all] [--coarse] [--jobs 2] [--limit 900]
+                                      [--missing]
 
 Each robot is drafted by `tcs robot new`, checked by `tcs robot check` and scored at goals around
-its reach, each in a process of its own that ends at the limit [s]. What is not supported ends in
-one line of the command.
+its reach, each in a process of its own that ends at the limit [s of processor] and may use 8 GB.
+What is not supported ends in one line of the command. With `--all`, every URDF of the package is
+drafted, also of what has no arm, with the tool named here or else its deepest link, and counted.
+`--missing` continues a run that was interrupted.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import resource
 import subprocess
 import sys
 import tempfile
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from table import header, parser, record, row, save
+import yaml
+from table import FIGURES, header, parser, record, row, save
+
+from tcs.errors import TcsError
+from tcs.model.robots.urdf.packages import resolve_uri
+from tcs.model.robots.urdf.reading import read_urdf
 
 DATA = "package://example-robot-data/robots"
 ROBOTS = {
@@ -49,6 +57,34 @@ ROBOTS = {
     "two_dofs": ("asr_twodof_description/urdf/TwoDofs.urdf", "Tip"),
 }
 """Path of the URDF and tool link of each robot; quadrupeds and quadrotors have no arm."""
+FURTHER_TOOLS = {
+    "alex_sake_hands": "LeftSakePalmLink",
+    "baxter": "left_gripper",
+    "g1_29dof_rev_1_0": "left_rubber_hand",
+    "icub_reduced": "l_hand_dh_frame",
+    "panda_collision": "panda_hand_tcp",
+    "pr2": "l_gripper_tool_frame",
+    "romeo_small": "l_wrist",
+    "simple_humanoid_classical": "l_wrist",
+    "talos_full_v2_box": "gripper_left_base_link",
+    "talos_left_arm": "gripper_left_base_link",
+    "talos_reduced": "gripper_left_base_link",
+    "talos_reduced_box": "gripper_left_base_link",
+    "talos_reduced_corrected": "gripper_left_base_link",
+    "tiago": "hand_tool_link",
+    "ur3_gripper": "ee_link",
+    "ur3_joint_limited_robot": "ee_link",
+    "ur5_gripper": "ee_link",
+    "ur5_joint_limited_robot": "ee_link",
+    "ur5_robot": "ee_link",
+    "ur10_joint_limited_robot": "ee_link",
+}
+"""Tool link of further URDFs, by the name of the file; others with `--all` are drafted with the
+link that most joints move."""
+MEMORY = 8e9
+"""Address space of a command [bytes]."""
+FREE = "free: {rotation_about: [0, 0, 1]}\n"
+"""What goals leave free for an arm of five joints."""
 
 ENVIRONMENT = """\
 name: board
@@ -63,18 +99,29 @@ grid:
   base_yaw: {unit: deg, start: 0, step: 45, count: 8}
   torso: {unit: m, start: 0, step: 0.1, count: 3}
 """
+SAVED = FIGURES / "drafting.json"
+NONE: dict[str, list[list[str]]] = {"rows": []}
 HEIGHTS = (0.2, 0.6, 0.9, 1.2)
-COLUMNS = ("robot", "drafted in [s]", "shapes", "check", "pairs reached", "what is said")
+COLUMNS = (
+    "robot",
+    "drafted in [s of processor]",
+    "shapes",
+    "check",
+    "pairs reached",
+    "what is said",
+)
 
 
 @dataclass(frozen=True)
 class Run:
-    """What a command did: its exit code, output, last line of messages, and time [s]."""
+    """What a command did: its exit code, output, last line of messages, and processor time [s]."""
 
     code: int | None
     output: str
     message: str
     seconds: float
+    is_one_line: bool = True
+    """Whether nothing but progress precedes the last line: no traceback."""
 
 
 def main() -> int:
@@ -82,35 +129,80 @@ def main() -> int:
     options = parse()
     header()
     rows = []
-    for name in options.robots.split(","):
-        rows.append((name, *outcome(name, options)))
+    robots = (
+        everything() if options.all else {name: ROBOTS[name] for name in options.robots.split(",")}
+    )
+    table = ("all" if options.all else "robots") + ("_coarse" if options.coarse else "")
+    done = saved_rows(table) if options.missing else ()
+    for name, (urdf, tool) in robots.items():
+        if name in done:
+            continue
+        rows.append((name, *outcome(urdf, tool, options)))
         row(name, ", ".join(text for text in rows[-1][1:] if text))
         # After each robot: an interrupted run keeps what it has.
-        record("coarse" if options.coarse else "robots", COLUMNS, rows)
-        save(options)
+        record(table, COLUMNS, rows)
+        save(options, keep=True)
     return 0
+
+
+def saved_rows(table: str) -> set[str]:
+    """Return the robots that the saved figures have in a table."""
+    if not SAVED.exists():
+        return set()
+    return {cells[0] for cells in json.loads(SAVED.read_text())["tables"].get(table, NONE)["rows"]}
+
+
+def everything() -> dict[str, tuple[str, str]]:
+    """Return the path of every URDF of the package and its tool link, by a name of its own."""
+    known = {urdf: (name, tool) for name, (urdf, tool) in ROBOTS.items()}
+    root, found = data_folder(), {}
+    for path in sorted(root.rglob("*.urdf")):
+        urdf = str(path.relative_to(root))
+        name, tool = known.get(urdf, (path.stem, FURTHER_TOOLS.get(path.stem, "")))
+        if name in found:
+            name = f"{urdf.split('_description')[0]}_{name}"
+        found[name] = urdf, tool or deepest(path)
+    return found
+
+
+def data_folder() -> Path:
+    """Return the folder of the robots of example-robot-data."""
+    return resolve_uri(f"{DATA}/{ROBOTS['ur10'][0]}", Path()).parents[2]
+
+
+def deepest(path: Path) -> str:
+    """Return the link that most joints move, the first of several; "tool" if a URDF is refused."""
+    try:
+        model = read_urdf(path)
+    except TcsError:
+        return "tool"
+    chains = {link: model.chain(model.root, link) or () for link in model.links}
+    return max(chains, key=lambda link: sum(joint.is_movable for joint in chains[link]))
 
 
 def parse():
     """Return the options."""
     found = parser(__doc__ or "")
     found.add_argument("--robots", default=",".join(ROBOTS), help="names, separated by commas")
+    found.add_argument("--all", action="store_true", help="every URDF of the package")
     found.add_argument("--coarse", action="store_true", help="draft with few shapes")
+    found.add_argument("--missing", action="store_true", help="only robots not saved yet")
     found.add_argument("--jobs", type=int, default=2)
-    found.add_argument("--limit", type=float, default=900.0, help="time for each command [s]")
+    found.add_argument("--limit", type=float, default=900.0, help="processor time of a command [s]")
     return found.parse_args()
 
 
-def outcome(name: str, options) -> tuple[str, str, str, str, str]:
+def outcome(urdf: str, tool: str, options) -> tuple[str, str, str, str, str]:
     """Return the cells of a robot's row after its name."""
-    urdf, tool = ROBOTS[name]
     with tempfile.TemporaryDirectory() as text:
         folder = Path(text)
         words = ["robot", "new", f"{DATA}/{urdf}", "--tool", tool, "--out", "drafted.yaml"]
         words += ["--jobs", str(options.jobs), *(["--coarse"] if options.coarse else [])]
         drafted = run(words, folder, options.limit)
         if drafted.code != 0:
-            return "", "", "", "", drafted.message
+            clear = drafted.code == 1 and drafted.is_one_line
+            said = drafted.message if clear else f"NOT ONE LINE: {drafted.message}"
+            return seconds(drafted), "", "", "", said
         shapes = len((folder / "drafted_primitives.csv").read_text().splitlines()) - 1
         checked = run(
             ["robot", "check", "drafted.yaml", "--samples", "100", "--json"], folder, options.limit
@@ -139,8 +231,10 @@ def score_words(folder: Path) -> list[str]:
         for y in (-0.2, 0.2)
         for z in HEIGHTS
     )
+    joints = yaml.safe_load((folder / "drafted.yaml").read_text())["arm_joints"]
     (folder / "task.yaml").write_text(
-        f"name: task\ntitle: task\nsource: made up\nenvironments: [board]\ngoals:\n{goals}"
+        "name: task\ntitle: task\nsource: made up\nenvironments: [board]\n"
+        f"{FREE if len(joints) == 5 else ''}goals:\n{goals}"
     )
     words = ["score", "task.yaml", "--environment", "board.yaml", "--robot", "drafted.yaml"]
     return [*words, "--out", "out.tcs", "--json"]
@@ -148,17 +242,37 @@ def score_words(folder: Path) -> list[str]:
 
 def run(words: list[str], folder: Path, limit: float) -> Run:
     """Run a command of tcs in a folder."""
-    began = time.monotonic()
     command = [sys.executable, "-c", "from tcs.cli import main; main()", *words]
-    try:
-        done = subprocess.run(
-            command, cwd=folder, capture_output=True, text=True, timeout=limit, env=os.environ
-        )
-    except subprocess.TimeoutExpired:
-        return Run(None, "", f"ended after {limit:g} s", limit)
+    before = processor_time()
+    done = subprocess.run(
+        command,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        env=os.environ,
+        preexec_fn=lambda: bound(limit),
+    )
+    used = processor_time() - before
+    if done.returncode < 0:
+        return Run(None, "", f"ended by signal {-done.returncode} after {used:.0f} s", used, False)
     lines = done.stderr.strip().splitlines()
     message = lines[-1].removeprefix("tcs: ") if lines else ""
-    return Run(done.returncode, done.stdout, message, time.monotonic() - began)
+    # The folder is another one on each machine.
+    message = message.replace(f"{data_folder()}/", "")
+    is_one_line = all(line.startswith("tcs: ") for line in lines)
+    return Run(done.returncode, done.stdout, message, used, is_one_line)
+
+
+def bound(limit: float) -> None:
+    """Bound processor time and address space of this process."""
+    resource.setrlimit(resource.RLIMIT_CPU, (int(limit), int(limit) + 5))
+    resource.setrlimit(resource.RLIMIT_AS, (int(MEMORY), int(MEMORY)))
+
+
+def processor_time() -> float:
+    """Return the processor time of all processes that have ended [s]."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def seconds(done: Run) -> str:

@@ -1,23 +1,28 @@
 """Run commands on machines that lack something, and count what goes wrong.
 
-Usage: python benchmarks/fault_conditions.py
+Usage: python benchmarks/fault_conditions.py [--flips 20] [--only NAME] [--seed 0]
 
 Each command that writes a file runs with a full disk, too little memory, no home and a folder that
-cannot be written; `tcs score` also beside another process with the same cold cache, and with a Dask
-worker that is killed. Afterwards the same command must end its work. Every count of a fault should
-be 0; the exit code is 1 if one is not.
+cannot be written; `tcs score` also beside another process with the same cold cache, with a Dask
+worker that is killed, and with a bit of its machine code flipped. `--only` names one of these
+conditions. Afterwards the same command must end its work. Every count of a fault should be 0; the
+exit code is 1 if one is not.
 """
 
 from __future__ import annotations
 
+import argparse
 import os
+import random
 import resource
+import shutil
 import signal
 import sys
 import tempfile
 import threading
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from itertools import islice
 from pathlib import Path
 
 from fault_commands import (
@@ -29,6 +34,9 @@ from fault_commands import (
     small_scores,
 )
 from table import header, parser, record, row, save
+
+from tcs.kernel.cache import jit_folder
+from tcs.kernel.machine_code import private_folder
 
 COLUMNS = (
     "tries",
@@ -52,12 +60,16 @@ FAULTS = COLUMNS[3:]
 
 def main() -> int:
     """Run every command under every condition and print the counts."""
-    options = parser(__doc__).parse_args()
+    command_line = parser(__doc__)
+    command_line.add_argument("--flips", type=int, default=20)
+    command_line.add_argument("--only", choices=("commands", "cold", "dask", "flips"))
+    command_line.add_argument("--seed", type=int, default=0)
+    options = command_line.parse_args()
     header()
     with tempfile.TemporaryDirectory() as above:
         folder = Path(above)
         environment, scores = small_scores(folder)
-        found = conditions(folder / "trials", environment, scores)
+        found = conditions(folder / "trials", environment, scores, options)
     for name, counts in found.items():
         row(name, ", ".join(f"{column} {counts[column]}" for column in COLUMNS))
     rows = [[name, *(str(counts[c]) for c in COLUMNS)] for name, counts in found.items()]
@@ -71,13 +83,16 @@ def limited(kind: int, most: int) -> Callable[[], None]:
     return lambda: resource.setrlimit(kind, (most, most))
 
 
-def conditions(folder: Path, environment: Path, scores: Path) -> dict[str, Counter[str]]:
+def conditions(
+    folder: Path, environment: Path, scores: Path, options: argparse.Namespace
+) -> dict[str, Counter[str]]:
     """Return the counts of every condition, by its name.
 
     Args:
         folder: Folder to make for the trials.
         environment: A small environment.
         scores: Its scores, made without any condition.
+        options: Which conditions, and how many flipped bits.
     """
     folder.mkdir()
     plain = {**os.environ, "PYTHONPATH": str(CHECKOUT)}
@@ -87,9 +102,10 @@ def conditions(folder: Path, environment: Path, scores: Path) -> dict[str, Count
     def count(name: str, command: Command, variables: Mapping[str, str], **limits: object) -> None:
         counts = found.setdefault(name, Counter(dict.fromkeys(COLUMNS, 0)))
         with tempfile.TemporaryDirectory(dir=folder) as made:
-            counts.update(tried(command, Path(made), dict(variables), plain, scores, **limits))
+            ended = tried(name, command, Path(made), dict(variables), plain, scores, **limits)
+            counts.update(ended)
 
-    for command in commands:
+    for command in commands if options.only in (None, "commands") else ():
         for most in LIMIT_FILE:
             limit = limited(resource.RLIMIT_FSIZE, most)
             count("files cannot grow (full disk)", command, plain, preexec_fn=limit)
@@ -98,9 +114,35 @@ def conditions(folder: Path, environment: Path, scores: Path) -> dict[str, Count
             count("too little memory", command, plain, preexec_fn=limit)
         count("no home", command, without_home(plain))
         count("folder that cannot be written", command.writing_to(Path("/proc")), plain)
-    found["two processes, one cold cache"] = cold_cache(folder / "cold", commands[0], plain, scores)
-    found["Dask worker killed"] = killed_worker(folder / "dask", commands[0], plain, scores)
+    if options.only in (None, "cold"):
+        made = cold_cache(folder / "cold", commands[0], plain, scores)
+        found["two processes, one cold cache"] = made
+    if options.only in (None, "dask"):
+        found["Dask worker killed"] = killed_worker(folder / "dask", commands[0], plain, scores)
+    if options.only in (None, "flips"):
+        for cache in islice(flipped_bits(folder / "flips", options.seed), options.flips):
+            variables = {**plain, "TCS_CACHE_DIR": str(cache)}
+            count("a bit of the machine code flipped", commands[0], variables)
     return found
+
+
+def flipped_bits(folder: Path, seed: int) -> Iterator[Path]:
+    """Yield again and again a cache folder whose machine code has one flipped bit."""
+    code = jit_folder()
+    assert code is not None
+    rng = random.Random(seed)
+    paths = sorted(path for path in code.iterdir() if path.is_file())
+    sizes = [path.stat().st_size for path in paths]
+    made = private_folder(folder / "jit") / code.name
+    while True:
+        # The copy of before was mended, by compiling again.
+        shutil.rmtree(made, ignore_errors=True)
+        shutil.copytree(code, made)
+        (chosen,) = rng.choices(paths, sizes)
+        content = bytearray(chosen.read_bytes())
+        content[rng.randrange(len(content))] ^= 1 << rng.randrange(8)
+        (made / chosen.name).write_bytes(content)
+        yield folder
 
 
 def without_home(variables: Mapping[str, str]) -> dict[str, str]:
@@ -110,6 +152,7 @@ def without_home(variables: Mapping[str, str]) -> dict[str, str]:
 
 
 def tried(
+    condition: str,
     command: Command,
     folder: Path,
     variables: dict[str, str],
@@ -122,22 +165,25 @@ def tried(
     temporary.mkdir()
     command.prepare(folder, scores)
     before = leftovers(folder, command)
+    made = (command.elsewhere or folder) / command.out
     running = command.run(folder, {**variables, "TMPDIR": str(temporary)}, **limits)
     _, err = running.communicate()
-    counts = Counter(judged(running.returncode, err))
+    counts = Counter(judged(f"{command.name}, {condition}", running.returncode, err))
     counts["files lost or half-written"] += not command.is_old_or_new(folder)
     counts["left over"] += len(leftovers(folder, command) - before)
-    counts["other scores in the end"] += not ends_the_same(command, folder, plain, scores)
+    is_other = running.returncode == 0 and command.scores and digest(made) != digest(scores)
+    ends = ends_the_same(command, folder, plain, scores)
+    counts["other scores in the end"] += is_other or not ends
     return counts
 
 
-def judged(code: int, err: str) -> dict[str, int]:
-    """Return the counts of how a process ended."""
+def judged(name: str, code: int, err: str) -> dict[str, int]:
+    """Return the counts of how a process ended; print how, with its name, if that is a fault."""
     # Without a place for machine code every run compiles, and says so.
     lines = [line for line in err.splitlines() if not is_note(line)]
     fine = (code == 0 and not lines) or (code == 1 and len(lines) == 1)
     if not fine:
-        print(f"    exit code {code}: {err[-600:]!r}", flush=True)
+        print(f"    {name}, exit code {code}: {err[-600:]!r}", flush=True)
     return {
         "tries": 1,
         "done all the same": code == 0,
@@ -173,7 +219,7 @@ def cold_cache(folder: Path, command: Command, plain: dict[str, str], scores: Pa
         running.append(command.run(one, {**variables, "TMPDIR": str(one / "tmp")}))
     for one, process in zip(folders, running, strict=True):
         _, err = process.communicate()
-        counts.update(judged(process.returncode, err))
+        counts.update(judged("cold cache", process.returncode, err))
         counts["files lost or half-written"] += not command.is_whole(one)
         counts["left over"] += len(leftovers(one, command))
         counts["other scores in the end"] += not ends_the_same(command, one, variables, scores)
@@ -208,7 +254,7 @@ def killed_worker(
         _, err = process.communicate()
         stop.set()
         killer.join()
-    counts = Counter({**dict.fromkeys(COLUMNS, 0), **judged(process.returncode, err)})
+    counts = Counter({**dict.fromkeys(COLUMNS, 0), **judged("Dask", process.returncode, err)})
     counts["files lost or half-written"] += not by_dask.is_old_or_new(folder)
     counts["left over"] += len(leftovers(folder, command))
     counts["other scores in the end"] += not ends_the_same(command, folder, plain, scores)

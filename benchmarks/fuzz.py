@@ -177,7 +177,7 @@ def main() -> None:
             table.cell("fuzz", name, outcome, f"{count[outcome]:,}")
         table.cell("fuzz", name, "pairs re-checked", f"{count['pairs']:,}")
         table.cell("fuzz", name, "slowest [s]", f"{slowest[name]:.1f}")
-    table.save(options)
+    table.save(options, keep=True)
 
 
 if __name__ == "__main__":

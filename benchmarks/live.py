@@ -52,6 +52,14 @@ def times(task: str, repeats: int) -> None:
     scorer = LiveScorer(task)
     row(f"{task}: scene and machine code", f"{time.perf_counter() - begun:.2f} s, once")
     rng = np.random.default_rng(0)
+    first = []
+    for _ in range(repeats):
+        x, y = rng.normal(0.0, 0.05, 2)
+        begun = time.perf_counter()
+        scorer.score({"person_x": float(x), "person_y": float(y)}, every=3)
+        first.append(time.perf_counter() - begun)
+    row(f"{task}: first answer of an observation", spread(first))
+    cell("times", task, "first answer, every third position", spread(first))
     wall, cpu, scoring, sets = [], [], [], []
     for _ in range(repeats):
         x, y = rng.normal(0.0, 0.05, 2)

@@ -83,7 +83,7 @@ def main() -> int:
     for work, values in zip(works, found, strict=True):
         report(work, values)
     by_robot(works, found)
-    save(options)
+    save(options, keep=True)
     return 0 if all(values["is_sound"] for values in found) else 1
 
 

@@ -4,7 +4,7 @@ Usage: python benchmarks/ros2.py FILE [--requests 300] [--save]
 
 FILE is a score file made by `tcs score`. The node is a process of its own; the client is pure Zenoh
 and listens in place of the router of rmw_zenoh. A latency is from before the request is encoded
-until its response is decoded.
+until its response is decoded. Measuring begins once the node has prepared what its first job needs.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 import zenoh
-from service import Asked, processor_time
+from service import Asked, processor_time, wait_until_idle
 from table import cell, header, parser, row, save
 
 from tcs.placement.store import load_scores
@@ -75,8 +75,8 @@ class Client:
         """Call through a session."""
         self.session, self._types, self._number = session, Ros2Types(), 0
 
-    def call(self, name: str, request: str) -> object | None:
-        """Return the response of a service, or None if there is none."""
+    def call(self, name: str, request: str, seconds: float = SECONDS) -> object | None:
+        """Return the response of a service, or None if there is none within a time [s]."""
         self._number += 1
         key = f"0/{name}/tcs_msgs::srv::dds_::Call_/{self._types.hash_of(CALL)}"
         fields = self._types.make(f"{CALL}_Request", request=request)
@@ -84,10 +84,10 @@ class Client:
         self.session.get(
             key, replies.put, payload=self._types.encode(f"{CALL}_Request", fields),
             attachment=struct.pack("<qqB16s", self._number, time.time_ns(), 16, bytes(16)),
-            timeout=SECONDS,
+            timeout=seconds,
         )  # fmt: skip
         try:
-            reply = replies.get(timeout=SECONDS)
+            reply = replies.get(timeout=seconds)
         except queue.Empty:
             return None
         if reply.ok is None:
@@ -102,6 +102,7 @@ def measured(client: Client, asked: Asked, requests: int, pid: int) -> int:
         # The node announces its services after it has connected.
         assert time.monotonic() < end, "the node does not answer"
         time.sleep(0.1)
+    wait_until_idle(pid)
     times, faults, before = [], 0, 0.0
     for number in range(WARM_UP + requests):
         if number == WARM_UP:
@@ -125,9 +126,10 @@ def measured(client: Client, asked: Asked, requests: int, pid: int) -> int:
 def found(client: Client, asked: Asked) -> bool:
     """Return whether the node answers and holds the file."""
     answer = client.session.liveliness().get("@ros2_lv/0/**/NN/**", timeout=1.0)
-    return (
-        any(True for _ in answer) and client.call("tcs/select", asked.body().decode()) is not None
-    )
+    if not any(True for _ in answer):
+        return False
+    # A request that is sent before the service is announced is lost.
+    return client.call("tcs/select", asked.body().decode(), seconds=2.0) is not None
 
 
 if __name__ == "__main__":

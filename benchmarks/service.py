@@ -1,11 +1,16 @@
 """Measure requests of the service over HTTP: select alone, 50 clients at once, malformed requests.
 
-Usage: python benchmarks/service.py FILE [--clients 50] [--requests 200] [--pause 0.0] [--save]
+Every request is of another state. Selections with the same weights share what does not depend on
+the state; with weights drawn for each request they share nothing.
+
+Usage: python benchmarks/service.py FILE [--clients 50] [--requests 200] [--rounds 5] [--pause 0.0]
+    [--save]
 
 FILE is a score file made by `tcs score`. The server is a process of its own; the clients share this
 process and write HTTP by hand, so that they take little of the processor. With `--pause`, a client
 waits between its requests on average so long [s]; without, it sends the next at once, and the
-latency is then the number of clients divided by the throughput. Measuring begins once the server
+latency is then the number of clients divided by the throughput. Every client sends its requests in
+each round; with weights drawn, all rounds together have as many. Measuring begins once the server
 has prepared what its first job needs.
 """
 
@@ -22,7 +27,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from table import cell, header, parser, row, save
+from table import cell, header, parser, row, save, spread
 
 from tcs.model.grid import Grid
 from tcs.placement.store import ScoreFile, load_scores
@@ -39,6 +44,7 @@ def main() -> int:
     command_line.add_argument("file", type=Path, metavar="FILE")
     command_line.add_argument("--clients", type=int, default=50)
     command_line.add_argument("--requests", type=int, default=200)
+    command_line.add_argument("--rounds", type=int, default=5)
     command_line.add_argument("--pause", type=float, default=0.0)
     command_line.add_argument("--seed", type=int, default=0)
     options = command_line.parse_args()
@@ -79,10 +85,14 @@ class Asked:
         self.x = [float(v) for v in grid.axis("base_x").values[[0, -1]]]
         self.y = [float(v) for v in grid.axis("base_y").values[[0, -1]]]
 
-    def body(self) -> bytes:
-        """Return a valid request."""
+    def body(self, *, weights: bool = False) -> bytes:
+        """Return a valid request, with the default weights or with some of its own."""
         here = [*(self.rng.uniform(*span) for span in (self.x, self.y)), self.rng.uniform(0, 360)]
-        return json.dumps({"file": self.digest, "here": here, "at": self.at}).encode()
+        body = {"file": self.digest, "here": here, "at": self.at}
+        if weights:
+            drawn = {"alpha": (0.5, 2.0), "beta": (0.5, 2.0), "gamma": (0.01, 0.2)}
+            body |= {name: self.rng.uniform(*span) for name, span in drawn.items()}
+        return json.dumps(body).encode()
 
     def malformed(self) -> bytes:
         """Return a request with some bytes replaced, cut off, or of another form."""
@@ -104,17 +114,9 @@ class Asked:
 async def measured(port: int, asked: Asked, options: argparse.Namespace, pid: int) -> None:
     """Run the measurements against a server."""
     alone, _ = await client(port, [asked.body() for _ in range(ALONE)], 0.0)
-    report("select, one client", alone[20:], 0, 0.0)
-    bodies = [[asked.body() for _ in range(options.requests)] for _ in range(options.clients)]
-    before, begun = processor_time(pid), time.perf_counter()
-    found = await asyncio.gather(*(client(port, some, options.pause) for some in bodies))
-    seconds, busy = time.perf_counter() - begun, processor_time(pid) - before
-    times = [t for one, _ in found for t in one]
-    faults = sum(one for _, one in found)
-    report(f"select, {options.clients} clients at once", times, faults, len(times) / seconds)
-    each = f"{1e3 * busy / len(times):.2f} ms"
-    row("  processor time of the server, each", each)
-    cell("service", f"select, {options.clients} clients at once", "processor time each", each)
+    report("select, one client", [alone[20:]], 0)
+    for weights in (False, True):
+        await at_once(port, asked, options, pid, weights=weights)
     answered = 0
     for _ in range(MALFORMED):
         status = await once(port, asked.malformed())
@@ -123,13 +125,36 @@ async def measured(port: int, asked: Asked, options: argparse.Namespace, pid: in
     cell("service", "malformed requests", "answered", f"{answered} of {MALFORMED}")
 
 
-def report(name: str, times: list[float], faults: int, rate: float) -> None:
-    """Print and record the latencies [s]."""
-    p50, p99 = (1e3 * float(np.quantile(times, q)) for q in (0.5, 0.99))
-    more = f", {rate:.0f} requests/s" if rate else ""
-    row(name, f"p50 {p50:.2f} ms, p99 {p99:.2f} ms, {faults} errors{more}")
-    cell("service", name, "p50", f"{p50:.1f} ms")
-    cell("service", name, "p99", f"{p99:.1f} ms")
+async def at_once(
+    port: int, asked: Asked, options: argparse.Namespace, pid: int, *, weights: bool
+) -> None:
+    """Measure many clients, each request of another state; `weights`: with weights of its own."""
+    name = f"select, {options.clients} clients at once" + (", weights drawn" if weights else "")
+    each = max(1, options.requests // options.rounds) if weights else options.requests
+    rounds, faults, busy, sent = [], 0, 0.0, 0
+    for _ in range(options.rounds):
+        bodies = [
+            [asked.body(weights=weights) for _ in range(each)] for _ in range(options.clients)
+        ]
+        before = processor_time(pid)
+        found = await asyncio.gather(*(client(port, some, options.pause) for some in bodies))
+        busy += processor_time(pid) - before
+        rounds.append([t for one, _ in found for t in one])
+        sent += len(rounds[-1])
+        faults += sum(one for _, one in found)
+    report(name, rounds, faults)
+    row("  processor time of the server, each", f"{1e3 * busy / sent:.2f} ms")
+    cell("service", name, "processor time each", f"{1e3 * busy / sent:.2f} ms")
+
+
+def report(name: str, rounds: list[list[float]], faults: int) -> None:
+    """Print and record the latencies of each round [s]: the median of the rounds, and the range."""
+    for column, quantile in (("p50", 0.5), ("p99", 0.99)):
+        of_rounds = [float(np.quantile(times, quantile)) for times in rounds]
+        text = spread(of_rounds, "ms", 1e3) if len(rounds) > 1 else f"{1e3 * of_rounds[0]:.2f} ms"
+        row(f"{name}, {column}", text)
+        cell("service", name, column, text)
+    row(f"{name}, errors", str(faults))
     cell("service", name, "errors", str(faults))
 
 
