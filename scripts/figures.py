@@ -18,7 +18,7 @@ import argparse
 import json
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -129,11 +129,24 @@ def as_markdown(saved: Mapping[str, Any], table: str, *, source: bool = True) ->
         columns, rows = found["columns"], found["rows"]
         lines = [f"| {' | '.join(columns)} |", f"|{'---|' * len(columns)}"]
         lines += [f"| {' | '.join(cells)} |" for cells in rows]
-    for run in saved.get("earlier", {}).get(table, ()):
-        lines += ["", f"*Earlier: {'; '.join(run['rows'])}: {run_text(run)}*"]
+    lines += earlier_lines(saved.get("earlier", {}).get(table, ()))
     if source:
         lines += ["", f"*{run_text(saved)}*"]
     return "\n".join([*lines, ""])
+
+
+def earlier_lines(runs: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Return where rows that were kept from earlier runs were measured, a paragraph a machine."""
+    by_machine: dict[str, list[str]] = {}
+    for run in runs:
+        machine = f"{run['machine']}; Python {run['python']}, {run['versions']}"
+        measured = f"`{run['command']}`, {run['date']}, load {run['load']}"
+        by_machine.setdefault(machine, []).append(f"{'; '.join(run['rows'])}: {measured}")
+    return [
+        line
+        for machine, measured in by_machine.items()
+        for line in ("", f"*Earlier, on {machine}: {'. '.join(measured)}.*")
+    ]
 
 
 def run_text(run: Mapping[str, Any]) -> str:

@@ -139,10 +139,16 @@ def test_rows_of_an_earlier_run_are_named(made):
     path = made.FIGURES / "made.json"
     saved = json.loads(path.read_text(encoding="utf-8"))
     where = dict.fromkeys(("date", "machine", "load", "python", "versions"), "y")
-    run = {"rows": ["step"], "command": "python benchmarks/made.py --rows step", **where}
-    path.write_text(json.dumps({**saved, "earlier": {"times": [run]}}), encoding="utf-8")
+    step = {"rows": ["step"], "command": "python benchmarks/made.py --rows step", **where}
+    others = {"rows": ["stop", "go"], "command": "python benchmarks/made.py", **where, "date": "z"}
+    older = {**others, "rows": ["stay"], "versions": "v"}
+    earlier = {"times": [step, others, older]}
+    path.write_text(json.dumps({**saved, "earlier": earlier}), encoding="utf-8")
     text = made.rewritten(PAGE)
-    assert text.count("*Earlier: step: `python benchmarks/made.py --rows step`, y: y, load y;") == 2
+    of_step = "step: `python benchmarks/made.py --rows step`, y, load y"
+    of_others = "`python benchmarks/made.py`, z, load y"
+    assert text.count(f"*Earlier, on y; Python y, y: {of_step}. stop; go: {of_others}.*") == 2
+    assert text.count(f"*Earlier, on y; Python y, v: stay: {of_others}.*") == 2
     assert made.rewritten(text) == text
 
 
