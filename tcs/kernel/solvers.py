@@ -122,29 +122,6 @@ def _worth_it(
     return REACHED, NO_CONTACT
 
 
-def is_seen_in_reach(problem: Problem, work: Workspace, solver: Solver) -> bool:
-    """Return whether a test that costs little shows a goal within reach; False without such a test.
-
-    Args:
-        problem: The scene.
-        work: Workspace with the goal in A.
-        solver: The arm's solver.
-    """
-    if isinstance(solver, Search):
-        return _is_in_reach(problem, work, solver)
-    return _is_never_seen(problem, work, solver)
-
-
-@inner
-def _is_in_reach(problem: Problem, work: Workspace, solver: Search) -> bool:
-    return analytic.out_of_reach(problem, work, solver) == REACHED
-
-
-@inner
-def _is_never_seen(problem: Problem, work: Workspace, solver: Solver) -> bool:
-    return False
-
-
 def score_pose(
     problem: Problem,
     work: Workspace,
@@ -274,16 +251,5 @@ class _QuickLook(_OfSolver):
         NumericSolver: _worth_it,
         SixJointSolver: _worth_it,
         FiveJointSolver: _worth_it,
-    }
-    entries: ClassVar[dict[Any, Any]] = {}
-
-
-@infer_global(is_seen_in_reach)
-class _IsSeenInReach(_OfSolver):
-    implementations: ClassVar[dict[type, Any]] = {
-        Search: _is_in_reach,
-        NumericSolver: _is_never_seen,
-        SixJointSolver: _is_never_seen,
-        FiveJointSolver: _is_never_seen,
     }
     entries: ClassVar[dict[Any, Any]] = {}

@@ -11,17 +11,21 @@ from scipy.spatial.transform import Rotation
 
 from tcs.kernel import sweep
 from tcs.kernel.contacts import NO_CONTACT
+from tcs.kernel.freedom.cap import cap_cosine, cap_pose
 from tcs.kernel.freedom.forms import COLUMNS
 from tcs.kernel.freedom.goals import free_goals
+from tcs.kernel.freedom.reach import wrist_reach
 from tcs.kernel.problem import build_problem
-from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED, TOO_FAR
+from tcs.kernel.scores import ARM_BLOCKED, BODY_BLOCKED, JOINT_LIMITS, REACHED, TOO_FAR
 from tcs.kernel.sweep import blocked_grippers, gripper_contacts
 from tcs.kernel.verification import free_scans
 from tcs.kernel.verification.dense import dense_scans
 from tcs.kernel.verification.free_scans import drawn_poses
+from tcs.kernel.verification.reference import compose, link_poses
 from tcs.kernel.verification.reference_freedom import at_offset, free_score, is_served, offset
 from tcs.model.tasks import Freedom
-from tests.kernel.shapes import about, random_arm
+from tests.kernel.shapes import about, random_arm, rotation, straight_arm
+from tests.kernel.test_six_joints import six_joint_chain
 from tests.kernel.toy import scores_of, toy_grid, toy_scene
 
 X = (1.0, 0.0, 0.0)
@@ -108,7 +112,9 @@ def test_a_rotation_that_the_last_joint_makes_frees_nothing():
     )
     reached = nominal.reason == REACHED
     assert 5 < np.sum(reached) < reached.size
-    np.testing.assert_array_equal(free.reason, nominal.reason)
+    # The bound of the wrist knows some to be too far that the arcs of the elbow leave open.
+    known = (free.reason == TOO_FAR) & (nominal.reason == JOINT_LIMITS)
+    np.testing.assert_array_equal(free.reason, np.where(known, TOO_FAR, nominal.reason))
     # The search of the free joint samples other angles at each pose.
     np.testing.assert_allclose(free.dexterity[reached], nominal.dexterity[reached], rtol=2e-3)
 
@@ -215,6 +221,141 @@ def test_a_nominal_goal_beside_a_free_one_keeps_its_score():
         mixed, 1, offset(free_goals(mixed.freedom, CHAIN).form[1], np.array([1.0, 0.2, 0, 0, 0, 0]))
     )
     assert np.abs(moved.goal_R[:, 1] - scene.goal_R[:, 1]).max() > 0.1
+
+
+def straight_chain(joints):
+    """Return an arm of right angles that can be straight: 0.42 + 0.4 m to its wrist."""
+    chain = straight_arm(np.full(7, np.inf), 0.0)
+    if joints == 7:
+        return chain
+    R, p = chain.R.copy(), chain.p.copy()
+    # Without the joint that rotates the upper arm, the elbow bends about the shoulder's direction.
+    R[1:3], p[1] = np.stack([np.eye(3), R[1]]), 0.0
+    R[3] = np.eye(3)
+    p[3] = [0.42, 0.0, 0.0]
+    return chain._replace(R=R, p=p, joints=6)
+
+
+@pytest.mark.parametrize("joints", [5, 6, 7])
+@pytest.mark.parametrize("slides", [(), (3, 4)], ids=["revolute", "prismatic"])
+def test_no_posture_takes_the_wrist_out_of_its_reach(joints, slides, rng):
+    chain = random_arm(rng)
+    sliding = np.zeros(7)
+    sliding[list(slides)] = 0.5
+    R, p = chain.R.copy(), chain.p.copy()
+    R[1 : 8 - joints], p[1 : 8 - joints] = np.eye(3), 0.0
+    lower, upper = np.maximum(chain.lower, -np.pi), np.minimum(chain.upper, np.pi)
+    lower[: 7 - joints], upper[: 7 - joints] = 0.0, 0.0
+    chain = chain._replace(R=R, p=p, lower=lower, upper=upper, joints=joints, slides=sliding)
+    reach, farthest = wrist_reach(chain), 0.0
+    for _ in range(500):
+        ends = rng.random(7) < 0.3
+        q = np.where(ends, np.where(rng.random(7) < 0.5, lower, upper), rng.uniform(lower, upper))
+        R_AT, p_AT = link_poses(chain, q)[-1]
+        away = np.linalg.norm(p_AT + R_AT @ reach.wrist - reach.pivot)
+        assert away <= reach.span
+        farthest = max(farthest, away)
+    assert farthest > 0.5 * reach.span
+
+
+@pytest.mark.parametrize("joints", [6, 7])
+def test_a_straight_arm_spans_its_reach(joints):
+    reach = wrist_reach(straight_chain(joints))
+    assert reach.span == pytest.approx(0.82, abs=1e-6)
+    np.testing.assert_allclose(reach.pivot, [0.0, 0.0, 0.34], atol=1e-6)
+    np.testing.assert_allclose(reach.wrist, [0.0, 0.0, -0.126], atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["rotation", "cone", "box", "orientation"])
+def test_wrists_are_where_the_poses_take_them(name):
+    free = free_goals(FREEDOMS[name].row()[None], CHAIN)
+    for u, wrist in zip(free.u, free.wrist, strict=True):
+        R, p = offset(free.form[0], u)
+        np.testing.assert_allclose(wrist, p + R @ free.reach.wrist, atol=1e-12)
+
+
+def test_poses_of_a_cap_are_evenly_in_it(rng):
+    free = free_goals(FREEDOMS["orientation"].row()[None], straight_chain(7))
+    reach, pivot = free.reach, rotation(rng) @ [0.0, 0.0, 0.93]
+    cosine = cap_cosine(reach.wrist, pivot, reach.span)
+    wrists, tools = [], []
+    for n in range(200):
+        u = np.empty(6)
+        cap_pose(free.form[0], reach.wrist, pivot, cosine, n, u)
+        R, p = offset(free.form[0], u)
+        np.testing.assert_array_equal(p, 0.0)
+        assert np.linalg.norm(R @ reach.wrist - pivot) <= reach.span + 1e-9
+        wrists.append(R @ reach.wrist / np.linalg.norm(reach.wrist))
+        tools.append(R)
+    # The mean of the cap is half its height from the rim, along its middle.
+    middle = pivot / np.linalg.norm(pivot)
+    np.testing.assert_allclose(np.mean(wrists, axis=0), (1.0 + cosine) / 2.0 * middle, atol=0.01)
+    # Rotations about the wrist are even: a fixed direction across it has no mean.
+    assert np.linalg.norm(np.mean(tools, axis=0) @ X) < 0.1
+    # Beyond the rim, the wrist is out of reach.
+    edge = np.arccos(cosine) + 0.01
+    beyond = about(np.cross(middle, np.eye(3)[0]), edge) @ middle * np.linalg.norm(reach.wrist)
+    assert np.linalg.norm(beyond - pivot) > reach.span
+
+
+@pytest.mark.parametrize(
+    ("away", "cosine"),
+    # With the wrist 0.1 m from the tool and a span of 0.7 m; where the pivot is 0.7 m away, the
+    # rim of the cap is at an isosceles triangle.
+    [(0.0, -1.0), (0.59, -1.0), (0.7, 0.05 / 0.7), (0.8 - 1e-12, 1.0), (0.81, 2.0)],
+)
+def test_a_cap_holds_what_is_within_reach(away, cosine):
+    pivot = np.array([away, 0.0, 0.0])
+    assert cap_cosine(np.array([0.0, 0.0, -0.1]), pivot, 0.7) == pytest.approx(cosine, abs=1e-9)
+
+
+def test_a_wrist_at_the_tool_has_no_cap():
+    assert cap_cosine(np.zeros(3), np.array([0.69, 0.0, 0.0]), 0.7) == -1.0
+    assert cap_cosine(np.zeros(3), np.array([0.71, 0.0, 0.0]), 0.7) == 2.0
+
+
+@pytest.mark.parametrize("joints", [6, 7])
+def test_goals_at_the_edge_of_reach_are_reached(joints, rng):
+    """The directions from which they are reached are few: 2 to 14 degrees about a single one."""
+    chain = straight_chain(joints)
+    scene, grid = scene_with(FREEDOMS["orientation"], goals=1, chain=chain), toy_grid(states=1)
+    bare = np.zeros_like(scene.arm_vs_environment), np.zeros_like(scene.arm_vs_body)
+    scene = scene._replace(
+        arm_vs_environment=bare[0], arm_vs_body=bare[1], arm_vs_arm=np.zeros_like(scene.arm_vs_arm)
+    )
+    alone = grid._replace(
+        base_x=np.zeros(1), base_y=np.zeros(1), base_yaw=np.zeros(1), torso_levels=1
+    )
+    scene = scene._replace(
+        arm_base_R=scene.arm_base_R[:1],
+        arm_base_p=scene.arm_base_p[:1],
+        body=scene.body._replace(R=scene.body.R[:1], p=scene.body.p[:1] + 9.0),
+    )
+    for short in np.repeat([1e-4, 3e-4, 1e-3, 4e-3, -1e-4], 4):
+        direction = rotation(rng)[:, 0]
+        p_AG = np.array([0.0, 0.0, 0.34]) + (0.82 + 0.126 - short) * direction
+        R_WG, p_WG = compose((scene.arm_base_R[0], scene.arm_base_p[0]), (rotation(rng), p_AG))
+        posed = scene._replace(goal_R=R_WG[None, None], goal_p=p_WG[None, None])
+        scores = scores_of(posed, alone)
+        assert scores.reason[0, 0] == (REACHED if short > 0 else TOO_FAR), short
+        if short > 0:
+            assert is_served(posed, alone, 0, 0, scores.joints[0, 0].astype(float))
+
+
+def test_a_pose_free_of_contact_among_blocked_ones_is_found():
+    """One pair of this scene is reached by few orientations, none of which is next to a sample."""
+    chain = six_joint_chain("spherical wrist", 10)
+    scene, grid = toy_scene(chain, 10, obstacles=12, goals=3, states=1), toy_grid(states=1)
+    scene = scene._replace(freedom=np.repeat(FREEDOMS["orientation"].row()[None], 3, axis=0))
+    scores, problem = scores_of(scene, grid), build_problem(scene, grid)
+    assert np.sum(scores.reason == REACHED) > 9
+    for goal in range(3):
+        left = np.flatnonzero(~np.isin(scores.reason[:, goal], (REACHED, BODY_BLOCKED)))
+        assert len(left) > 10
+        posed = free_scans.at_poses(problem, 0, goal)
+        for h in left:
+            # Goals of the scan are poses without freedom.
+            assert free_scans.best_score(posed, int(h))[0] < 0.0
 
 
 def test_samples_of_any_orientation_leave_no_wide_gap():

@@ -177,11 +177,26 @@ def _next_to(form: FloatArray, samples: FloatArray) -> tuple[FloatArray, IntArra
 
 def _coordinates(form: FloatArray, u: FloatArray) -> FloatArray:
     """Return points whose distances are those of poses: quaternions, and positions in the box."""
-    tilt = Rotation.from_rotvec(u[:, 1:2] * form[9:12] + u[:, 2:3] * form[12:15])
-    about = Rotation.from_rotvec(u[:, :1] * form[AXIS : AXIS + 3])
     half = form[HALF : HALF + 3]
     inside = u[:, 3:6] / np.where(half > 0.0, half, 1.0)
-    return np.concatenate([(tilt * about).as_quat(), inside], axis=1)
+    return np.concatenate([_orientations(form, u).as_quat(), inside], axis=1)
+
+
+def wrist_positions(form: FloatArray, u: FloatArray, wrist: FloatArray) -> FloatArray:
+    """Return positions in the frame of the goal [m], shape (n, 3), of a point of the tool.
+
+    Args:
+        form: Row of `FreeGoals.form`.
+        u: Parameters, shape (n, PARAMETERS).
+        wrist: The point in T [m], shape (3,).
+    """
+    return np.array(u[:, 3:6] + _orientations(form, u).apply(wrist))
+
+
+def _orientations(form: FloatArray, u: FloatArray) -> Rotation:
+    """Return the orientations R_GT of poses."""
+    tilt = Rotation.from_rotvec(u[:, 1:2] * form[9:12] + u[:, 2:3] * form[12:15])
+    return tilt * Rotation.from_rotvec(u[:, :1] * form[AXIS : AXIS + 3])
 
 
 def _between(

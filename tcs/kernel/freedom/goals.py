@@ -17,7 +17,9 @@ from tcs.kernel.freedom.forms import (
     Poses,
     poses_of,
     spacing,
+    wrist_positions,
 )
+from tcs.kernel.freedom.reach import WristReach, wrist_reach
 
 
 class FreeGoals(NamedTuple):
@@ -46,8 +48,10 @@ class FreeGoals(NamedTuple):
     """Further poses of the goal, by their numbers: each twice, unless both its samples are one."""
     u: FloatArray
     """Parameters of each pose [rad and m], shape (poses, PARAMETERS)."""
-    reach: float
-    """Upper bound of the distance of the tool from the first joint [m]."""
+    wrist: FloatArray
+    """Position of the wrist at each pose, in the frame of the goal [m], shape (poses, 3)."""
+    reach: WristReach
+    """Where the wrist has to be."""
 
 
 def no_freedom() -> FreeGoals:
@@ -62,7 +66,8 @@ def no_freedom() -> FreeGoals:
         child_first=np.zeros(1, np.int64),
         children=none,
         u=np.empty((0, PARAMETERS)),
-        reach=np.inf,
+        wrist=np.empty((0, 3)),
+        reach=WristReach(np.zeros(3), np.zeros(3), np.inf),
     )
 
 
@@ -75,10 +80,8 @@ def free_goals(rows: FloatArray, chain: Chain) -> FreeGoals:
     """
     if not np.any(rows):
         return no_freedom()
-    slides = chain.slides > 0.0
-    farthest = np.maximum(np.abs(chain.lower), np.abs(chain.upper))
-    longest = float(farthest[slides] @ chain.slides[slides])
-    forms, steps, counts, starts = [], [], [], []
+    reach = wrist_reach(chain)
+    forms, steps, counts, starts, wrists = [], [], [], [], []
     poses: dict[bytes, tuple[int, Poses]] = {}
     total = 0
     for row in rows:
@@ -90,6 +93,7 @@ def free_goals(rows: FloatArray, chain: Chain) -> FreeGoals:
         if key not in poses:
             poses[key] = total, poses_of(key)
             total += len(poses[key][1].u)
+            wrists.append(wrist_positions(form, poses[key][1].u, reach.wrist))
         start, found = poses[key]
         forms.append(form)
         steps.append(spacing(form))
@@ -106,7 +110,8 @@ def free_goals(rows: FloatArray, chain: Chain) -> FreeGoals:
         child_first=np.cumsum([0, *number]),
         children=np.concatenate([found.children for found in parts]),
         u=np.ascontiguousarray(np.concatenate([found.u for found in parts])),
-        reach=float(np.linalg.norm(chain.p, axis=1).sum() + longest),
+        wrist=np.ascontiguousarray(np.concatenate(wrists)),
+        reach=reach,
     )
 
 

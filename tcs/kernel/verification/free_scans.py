@@ -100,6 +100,7 @@ def _turning(problem: Problem, count: int) -> FreeGoals:
         parents=np.zeros((1, 2), np.int64),
         child_first=np.zeros(2, np.int64),
         u=np.zeros((1, PARAMETERS)),
+        wrist=np.zeros((1, 3)),
         reach=problem.freedom.reach,
     )
 
@@ -125,7 +126,7 @@ def free_scans(
             continue
         posed = at_poses(problem, state, int(goal))
         if problem.joints < 7:
-            values[i], joints[i] = _best_score(posed, int(configuration))
+            values[i], joints[i] = best_score(posed, int(configuration))
             continue
         clear = np.flatnonzero(gripper_contacts(posed)[state] == NO_CONTACT)
         if not clear.size:
@@ -138,7 +139,7 @@ def free_scans(
     return values
 
 
-def _best_score(posed: Problem, configuration: int) -> tuple[float, FloatArray]:
+def best_score(posed: Problem, configuration: int) -> tuple[float, FloatArray]:
     """Return the greatest score over the goals of a problem, and its joints; -1 for none."""
     count = posed.goal_p.shape[1]
     scores = Scores(
