@@ -36,7 +36,7 @@ REFINEMENTS, MORE_REFINEMENTS = int_constant(3), int_constant(8)
 contacts the best solution lies next to one of them, and where joints move fast they move far from
 one sample to the next: both take more."""
 REFINE_SAMPLES = int_constant(8)
-QUICK_TRIES = int_constant(24)
+QUICK_TRIES = int_constant(48)
 """Candidates of a pose that a quick look checks for contacts, evenly among all."""
 WORTH = 1.00001
 """By what factor a solution found later must be better to replace one: isotropy counts to the sixth
