@@ -46,7 +46,7 @@ ANY = -1.0
 """Bound of a measure that every solution exceeds."""
 
 
-class Goal(NamedTuple):
+class PlacedGoal(NamedTuple):
     """A goal at an initial configuration, whose base is in place."""
 
     state: int
@@ -88,7 +88,7 @@ def score_free(
         Reason and contact code, those of the first pose that comes farthest.
     """
     free, form = problem.freedom, problem.freedom.form[g]
-    goal = Goal(state, torso, g)
+    goal = PlacedGoal(state, torso, g)
     pivot, best, u = np.empty(3), np.empty(7), np.empty(PARAMETERS)
     _pivot_in_goal(problem, work, goal, pivot)
     if _is_out_of_span(problem, pivot, g):
@@ -119,7 +119,7 @@ def _try_samples(
     work: Workspace,
     solver: Solver,
     grippers: IntArray,
-    goal: Goal,
+    goal: PlacedGoal,
     pivot: FloatArray,
     worth: IntArray,
     best: FloatArray,
@@ -175,7 +175,7 @@ def _try_next_to(
     problem: Problem,
     work: Workspace,
     solver: Solver,
-    goal: Goal,
+    goal: PlacedGoal,
     pivot: FloatArray,
     worth: IntArray,
     reason: int,
@@ -234,7 +234,7 @@ def _try_cap(
     problem: Problem,
     work: Workspace,
     solver: Solver,
-    goal: Goal,
+    goal: PlacedGoal,
     pivot: FloatArray,
     u: FloatArray,
 ) -> bool:
@@ -273,7 +273,7 @@ def _score_at(
     problem: Problem,
     work: Workspace,
     solver: Solver,
-    goal: Goal,
+    goal: PlacedGoal,
     u: FloatArray,
     least: float,
 ) -> tuple[int, int]:
@@ -289,7 +289,7 @@ def _refine(
     problem: Problem,
     work: Workspace,
     solver: Solver,
-    goal: Goal,
+    goal: PlacedGoal,
     u: FloatArray,
     best: FloatArray,
     value: float,
@@ -354,7 +354,7 @@ def progress_of(reason: int) -> int:
 
 
 @inner
-def _pivot_in_goal(problem: Problem, work: Workspace, goal: Goal, pivot: FloatArray) -> None:
+def _pivot_in_goal(problem: Problem, work: Workspace, goal: PlacedGoal, pivot: FloatArray) -> None:
     """Fill the position of the pivot in the frame of the goal [m], shape (3,)."""
     R_WG, p_WG = problem.goal_R[goal.state, goal.goal], problem.goal_p[goal.state, goal.goal]
     pose_in_arm_base(problem, work, goal.torso, R_WG, p_WG)
