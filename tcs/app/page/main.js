@@ -311,6 +311,7 @@ async function space() {
   const goal = by("armAt").value;
   const found = await post("posture", { ...placed(), ...(goal ? { goal: Number(goal) } : {}) });
   if (number !== page.asked) return;
+  by("building").hidden = true;
   view3d.map(map.canvas, map.painted);
   view3d.scene(found, page.outcome.goals);
   if (page.lookedAt !== file().file) view3d.look(found.goals, [map.pose.x, map.pose.y]);

@@ -172,6 +172,7 @@ export class View3d {
     if (!canvas.width) return;
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    if (!this.key) return; // The floor has no colours yet.
     const camera = this.#camera();
     gl.uniformMatrix4fv(places.camera, false, camera);
     gl.uniform4fv(places.bounds, this.bounds);
