@@ -178,6 +178,7 @@ def test_the_3d_view_follows_and_motions_are_played(page):
         "return document.getElementById('marks3d').toDataURL()"
     )
     page.wait(lambda: script("return document.getElementById('armAt').options.length") > 1)
+    page.wait(lambda: script("return document.getElementById('building').hidden"))
     page.wait(lambda: script("return document.getElementById('marks3d').width") > 100)
     before = script(picture)
     page.wait(lambda: script(picture) != before)
