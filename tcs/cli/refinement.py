@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from tcs.cli import options
-from tcs.cli.robustness import table_of
+from tcs.cli.robustness import BodyCollisions, table_of
 from tcs.output import terminal
 
 
@@ -45,6 +45,7 @@ def refine(
             "environment as the best set of the grid."
         ),
     ] = True,
+    body_collisions: BodyCollisions = "paper",
     seed: options.Seed = 0,
     observed: options.Observed = None,
     jobs: options.Jobs = 2,
@@ -71,6 +72,7 @@ def refine(
             rounds=rounds,
             samples=samples,
             keep_success=keep_success,
+            body_collisions=body_collisions,
             seed=seed,
             table=table,
             jobs=jobs,

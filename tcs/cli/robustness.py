@@ -29,7 +29,7 @@ Delta = Annotated[
         "`tcs robustify` can be selected."
     ),
 ]
-_BodyCollisions = Annotated[
+BodyCollisions = Annotated[
     str,
     typer.Option(
         metavar="paper|all|none",
@@ -72,7 +72,7 @@ def evaluate(
         ),
     ] = None,
     observed: options.Observed = None,
-    body_collisions: _BodyCollisions = "paper",
+    body_collisions: BodyCollisions = "paper",
     check_base: _CheckBase = False,
     replan: Annotated[
         bool, typer.Option(help="Of a plan: whether motions are also planned anew in each sample.")
@@ -148,7 +148,7 @@ def robustify(
     seed: options.Seed = 0,
     errors: _Errors = None,
     observed: options.Observed = None,
-    body_collisions: _BodyCollisions = "paper",
+    body_collisions: BodyCollisions = "paper",
     check_base: _CheckBase = False,
     blocks: options.Blocks = None,
     restart: options.Restart = False,

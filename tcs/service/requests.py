@@ -235,6 +235,7 @@ class RefineRequest(Observed):
     rounds: Annotated[int, Field(strict=True, ge=1, le=1000)] = 40
     samples: Annotated[int, Field(strict=True, ge=1, le=10_000)] | None = None
     keep_success: Annotated[bool, Field(strict=True)] = True
+    body_collisions: Text = "paper"
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
 
 

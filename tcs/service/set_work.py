@@ -61,6 +61,7 @@ class SetWork:
             rounds=request.rounds,
             samples=request.samples,
             keep_success=request.keep_success,
+            body_collisions=request.body_collisions,
             seed=request.seed,
             table=table,
             jobs=self._limits.threads,

@@ -36,8 +36,9 @@ from tcs.placement.refinement.points import PointScorer
 from tcs.placement.refinement.search import LocalSearch, Walk, without_idle_members
 from tcs.placement.refinement.space import Space
 from tcs.placement.refinement.staged import StagedSamples
-from tcs.placement.refinement.surest import SurestSearch, surest_pairs
+from tcs.placement.refinement.surest import SurestSearch, surest_pairs, surest_triples
 from tcs.placement.robustness import PerturbedPoints, Trials
+from tcs.placement.robustness.body_collisions import check_body_collisions
 from tcs.placement.selection import Top, UtilityWeights, select
 from tcs.placement.selection.choice import SelectionTables
 from tcs.placement.store import ScoreFile
@@ -84,6 +85,7 @@ def refine(
     rounds: int = 40,
     samples: int | None = None,
     keep_success: bool = True,
+    body_collisions: str = "paper",
     seed: int = 0,
     table: int | None = None,
     jobs: int = 2,
@@ -111,6 +113,8 @@ def refine(
         keep_success: Whether, with the objective "score", a set must be at least as sure under
             the errors of the environment (of the base, if it has none) as the best set of the
             grid, in the hardest of the samples and in others that judge the result.
+        body_collisions: Collisions of the robot's body that count under the errors of the
+            environment, one of `BODY_COLLISIONS`. Without errors all count, as when scoring.
         seed: Seed of the search and of the samples; the result is the same for any number of
             jobs.
         table: Number of the table; by default the nominal one. The others keep what they have.
@@ -123,7 +127,7 @@ def refine(
 
     Raises:
         StoreMismatchError: If the file was made from other models.
-        UnknownNameError: If there is no such objective.
+        UnknownNameError: If there is no such objective or choice of collisions.
         SelectionError: If no configuration reaches a goal, there is no such table, or the file was
             scored with approach.
         TcsError: If a number is out of range.
@@ -134,6 +138,7 @@ def refine(
     check_draws(samples, seed)
     if objective not in OBJECTIVES:
         raise UnknownNameError("objective", objective, OBJECTIVES, where="refine")
+    check_body_collisions(body_collisions)
     if not 1 <= starts <= MOST_STARTS:
         raise TcsError(f"starts is {starts}; must be 1 to {MOST_STARTS}.")
     if not 1 <= rounds <= MOST_ROUNDS:
@@ -148,7 +153,8 @@ def refine(
     scorer.warm_up(on_compile)
     sets = file.tables[number].sets
     is_scored = objective in WITHOUT_SAMPLES
-    draw = _samples(file, number, scorer, objective, seed)
+    trials = Trials.built(file, number, scorer.built, body_collisions=body_collisions)
+    draw = _samples(trials, scorer, objective, seed)
     drawn = draw(samples, SAMPLES_STREAM)
     # Rails run along x of the mount; beside them there is nothing to bolt a robot to.
     rails = ("base_y",) if file.environment.get("mount") else ()
@@ -158,7 +164,8 @@ def refine(
         staged = StagedSamples.of(drawn, sets.weights)
         search: LocalSearch = SurestSearch.of(scorer, space, staged, rng)
         pairs = surest_pairs(staged, search, sets, starts, APART)
-        starts_at = list(dict.fromkeys([*starting_sets(file, number, 1), *pairs]))
+        triples = surest_triples(staged, search, sets, pairs)
+        starts_at = list(dict.fromkeys([*starting_sets(file, number, 1), *pairs, *triples]))
     else:
         search = LocalSearch(scorer, space, _objective(objective, sets, drawn), rng)
         starts_at = starting_sets(file, number, starts)
@@ -194,6 +201,7 @@ def refine(
         "samples": None if success is None else samples,
         "keep_success": keep,
         "displaced": success is not None and isinstance(judging, DisplacedBases),
+        "body_collisions": body_collisions,
         "seed": seed,
         "scored": scored,
         "success": success,
@@ -235,14 +243,13 @@ def starting_sets(file: ScoreFile, table: int, count: int) -> list[tuple[int, ..
 
 
 def _samples(
-    file: ScoreFile, table: int, scorer: PointScorer, objective: str, seed: int
+    trials: Trials, scorer: PointScorer, objective: str, seed: int
 ) -> Callable[[int, str], Samples]:
     """Return a function that draws samples, given their number and the name of the stream.
 
     They are errors of the environment; displacements of the base for the objectives "margin" and
     "ball", and where no joint of the environment has an error.
     """
-    trials = Trials.built(file, table, scorer.built)
 
     def drawn(samples: int, stream: str) -> Samples:
         if objective == "ball":

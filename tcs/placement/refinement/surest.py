@@ -1,13 +1,14 @@
-"""The surest sets: pairs of all candidates under error, and a local search from the best."""
+"""The surest sets: pairs of all candidates under error, with a third member, and a local search."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
 from tcs.placement.refinement.objectives import TIE, Features, ScoreObjective
@@ -21,6 +22,8 @@ MOST_CANDIDATES = 8000
 """Greatest number of candidates whose pairs are compared, those with the best scores."""
 PAIRS = (20_000, 2000, 200, 50)
 """Pairs that remain after each stage of the choice of starts."""
+THIRDS = (500, 50, 10, 1)
+"""Third members of a pair that remain after each stage of the choice of sets of three."""
 SETS = (32, 12, 4, 1)
 """Sets around a set that remain after each stage of a round of the search."""
 SCREENING_ROUNDS = 2
@@ -52,7 +55,7 @@ def surest_pairs(
     for stage, remaining in zip(range(staged.stages), PAIRS, strict=False):
         points = search.points_of(sets.candidates[members].tolist())
         features = staged.features(points, stage)
-        allowed = np.triu(_allowed(sets, members), 1)
+        allowed = np.triu(_allowed(sets, members, members), 1)
         preference = PREFERENCE * (scores[members][:, None] + scores[members])
         first, second = best_pairs(features, features, allowed, preference, remaining)
         pairs = members[first], members[second]
@@ -69,13 +72,56 @@ def surest_pairs(
     return [tuple(int(h) for h in sets.candidates[list(pair)]) for pair in chosen]
 
 
-def _allowed(sets: SetTable, members: IntArray) -> BoolArray:
-    """Return which pairs of candidates keep the rules of the table's sets, shape (n, n)."""
-    at = sets.cell_xy[sets.cell[members]]
-    distance = np.hypot(*(at[:, None] - at).transpose(2, 0, 1))
+def surest_triples(
+    staged: StagedSamples,
+    search: LocalSearch,
+    sets: SetTable,
+    pairs: Sequence[tuple[int, ...]],
+) -> list[tuple[int, ...]]:
+    """Return pairs with the third member that recovers most of what they lose, in their order.
+
+    Pairs without a third member that recovers something are left out.
+
+    Args:
+        staged: The samples.
+        search: A search on the grid of the table.
+        sets: The sets of the table.
+        pairs: Flat grid indices of the members of each pair, which are candidates.
+    """
+    if sets.max_members < 3:
+        return []
+    scores = sets.single_reachability + sets.single_manipulability
+    found = []
+    for pair in pairs:
+        points = search.points_of(pair)
+        of_two = staged.successes([points], staged.stages - 1)[0]
+        if of_two > 1.0 - GAIN:
+            continue
+        members = np.searchsorted(sets.candidates, pair)
+        others = np.sort(np.argsort(-scores, kind="stable")[:MOST_CANDIDATES])
+        others = others[np.all(_allowed(sets, others, members), axis=1)]
+        for stage, remaining in zip(range(staged.stages), THIRDS, strict=False):
+            of_pair = staged.features(points, stage).max(axis=0)
+            third = staged.features(search.points_of(sets.candidates[others].tolist()), stage)
+            success = (np.maximum(third, of_pair) ** 2).sum(axis=1)
+            order = np.argsort(-(success + PREFERENCE * scores[others]), kind="stable")
+            others = others[order[:remaining]]
+        triples = [(*pair, int(sets.candidates[third])) for third in others[:1]]
+        found += [
+            triple
+            for triple in triples
+            if staged.successes([search.points_of(triple)], staged.stages - 1)[0] > of_two + GAIN
+        ]
+    return found
+
+
+def _allowed(sets: SetTable, first: IntArray, second: IntArray) -> BoolArray:
+    """Return which pairs of candidates keep the rules of the table's sets, shape (n, m)."""
+    at = sets.cell_xy[sets.cell]
+    distance = np.hypot(*(at[first][:, None] - at[second]).transpose(2, 0, 1))
     allowed = distance >= sets.min_distance - 1e-9
     if sets.same_environment:
-        allowed &= sets.state[members][:, None] == sets.state[members]
+        allowed &= sets.state[first][:, None] == sets.state[second]
     return np.asarray(allowed)
 
 
@@ -149,22 +195,26 @@ class SurestSearch(LocalSearch):
         return [(sets[best], better)] if better > walk.value + GAIN else []
 
     def _screened(self, choices: Sequence[Evaluated]) -> list[Evaluated]:
-        """Return the combinations that are the surest in the first samples, the best first."""
+        """Return the combinations that are the surest in the first samples, the best first.
+
+        Any two members change together, the others of a set of three stay.
+        """
         assert self.staged is not None
         features = [self.staged.features(part.points, 0) for part in choices]
-        scores = [
+        preferences = [
             PREFERENCE
             * self.objective.values(Features(part.reached[:, None], part.dexterity[:, None]))
             for part in choices
         ]
-        if len(choices) == 2:
-            allowed = self.space.allowed(_grid_of(choices)).reshape(len(features[0]), -1)
-            preference = scores[0][:, None] + scores[1]
-            first, second = features
-            pairs = best_pairs(first, second, allowed, preference, SETS[0])
-            which = np.stack(pairs, axis=1)
+        found = _Combinations(choices, features, preferences)
+        if len(choices) == 1:
+            which = np.arange(len(features[0]))[:, None]
         else:
-            which = self._one_by_one(choices, features, scores)
+            together = itertools.combinations(range(len(choices)), 2)
+            which = np.concatenate([found.best(self.space, *both) for both in together])
+            which = np.unique(which, axis=0) if len(choices) > 2 else which
+        if len(choices) != 2:
+            which = which[np.argsort(-found.values(which), kind="stable")[: SETS[0]]]
         return [
             Evaluated.joined(
                 [part.rows(slice(k, k + 1)) for part, k in zip(choices, row, strict=True)]
@@ -172,33 +222,46 @@ class SurestSearch(LocalSearch):
             for row in which
         ]
 
-    def _one_by_one(
-        self,
-        choices: Sequence[Evaluated],
-        features: Sequence[np.ndarray],
-        scores: Sequence[FloatArray],
-    ) -> IntArray:
-        """Return the surest of the sets in which a single member differs from the present one."""
-        present = [part[0] for part in features]
-        rows, values = [], []
-        for i, part in enumerate(features):
-            others = [present[k] for k in range(len(present)) if k != i]
-            together = np.maximum.reduce([part, *(np.broadcast_to(o, part.shape) for o in others)])
-            for k, value in enumerate((together**2).sum(axis=1) + scores[i]):
-                row = [0] * len(choices)
-                row[i] = k
-                rows.append(row)
-                values.append(float(value))
-        which = np.array(rows)
-        members = np.stack([part.values[which[:, i]] for i, part in enumerate(choices)], axis=1)
-        order = np.argsort(-np.where(self.space.allowed(members), values, -np.inf), kind="stable")
-        order = order[self.space.allowed(members)[order]]
-        return np.asarray(which[order[: SETS[0]]])
 
+class _Combinations(NamedTuple):
+    """Configurations around each member of a set, the present member first."""
 
-def _grid_of(choices: Sequence[Evaluated]) -> FloatArray:
-    """Return the values of every combination of two choices, shape (n * m, 2, axes)."""
-    first, second = (part.values for part in choices)
-    pairs = itertools.product(range(len(first)), range(len(second)))
-    rows = np.array(list(pairs))
-    return np.stack([first[rows[:, 0]], second[rows[:, 1]]], axis=1)
+    choices: Sequence[Evaluated]
+    """The configurations."""
+    features: Sequence[NDArray[np.float32]]
+    """What they reach, of `StagedSamples.features`, shapes (n, F)."""
+    preferences: Sequence[FloatArray]
+    """Decide among equals where greater, shapes (n,)."""
+
+    def best(self, space: Space, i: int, j: int) -> IntArray:
+        """Return the surest sets in which no member but two differs from the present one.
+
+        Args:
+            space: Tells which sets are allowed.
+            i: Number of the first member that differs.
+            j: Number of the second.
+
+        Returns:
+            Number of the configuration of each member, shape (k, members).
+        """
+        shape = len(self.features[i]), len(self.features[j])
+        which = np.zeros((shape[0] * shape[1], len(self.choices)), dtype=np.int64)
+        which[:, i], which[:, j] = (at.ravel() for at in np.indices(shape))
+        members = np.stack(
+            [part.values[rows] for part, rows in zip(self.choices, which.T, strict=True)], axis=1
+        )
+        # What the others reach is reached whatever these two do.
+        others = [of[0] for k, of in enumerate(self.features) if k not in (i, j)]
+        rest = np.logical_or.reduce([of > 0.0 for of in others]) if others else np.False_
+        first, second = (np.where(rest, np.float32(0.0), self.features[k]) for k in (i, j))
+        preference = self.preferences[i][:, None] + self.preferences[j]
+        allowed = space.allowed(members).reshape(shape)
+        rows, columns = best_pairs(first, second, allowed, preference, SETS[0])
+        return np.asarray(which[rows * shape[1] + columns])
+
+    def values(self, which: IntArray) -> FloatArray:
+        """Return the success of sets with the preferences, given as by `best`, shape (k,)."""
+        of_members = list(zip(self.features, which.T, strict=True))
+        success = (np.maximum.reduce([of[rows] for of, rows in of_members]) ** 2).sum(axis=1)
+        liked = [of[rows] for of, rows in zip(self.preferences, which.T, strict=True)]
+        return np.asarray(success + np.sum(liked, axis=0))

@@ -25,7 +25,7 @@ def check_body_collisions(name: str) -> None:
         UnknownNameError: If it is not.
     """
     if name not in BODY_COLLISIONS:
-        raise UnknownNameError("body collisions", name, BODY_COLLISIONS, where="evaluate")
+        raise UnknownNameError("body collisions", name, BODY_COLLISIONS)
 
 
 def counted_pairs(scene: Scene, lowered: LoweredScene, body_collisions: str) -> BoolArray:

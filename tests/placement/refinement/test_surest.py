@@ -12,7 +12,7 @@ from tcs.placement.refinement import PointScorer
 from tcs.placement.refinement.floor import RememberedSamples, successes
 from tcs.placement.refinement.space import Space
 from tcs.placement.refinement.staged import StagedSamples, best_pairs
-from tcs.placement.refinement.surest import SurestSearch, surest_pairs
+from tcs.placement.refinement.surest import SETS, SurestSearch, surest_pairs, surest_triples
 from tcs.placement.robustness import PerturbedPoints, Trials
 from tcs.placement.tables import Points
 from tests.beside import BESIDE
@@ -95,9 +95,14 @@ def test_the_best_pairs_are_those_of_a_plain_loop(made, rng, monkeypatch, count)
 
 
 @pytest.fixture(scope="module")
-def scored(tmp_path_factory):
-    environment = tmp_path_factory.mktemp("beside") / "beside.yaml"
-    environment.write_text(BESIDE)
+def environment(tmp_path_factory):
+    path = tmp_path_factory.mktemp("beside") / "beside.yaml"
+    path.write_text(BESIDE)
+    return path
+
+
+@pytest.fixture(scope="module")
+def scored(environment):
     return tcs.score("shaving", environment)
 
 
@@ -123,6 +128,65 @@ def test_the_first_start_is_the_surest_pair_of_all_candidates(scored, search):
     first = search.staged.successes([search.points_of(found[0])], 1)[0]
     assert first == pytest.approx(success.max(), abs=1e-6)
     assert len(set(found)) == len(found) > 1
+
+
+@pytest.fixture(scope="module")
+def of_three(environment):
+    return tcs.score("shaving", environment, max_members=3)
+
+
+def test_the_third_member_recovers_most_of_what_a_pair_loses(of_three, search):
+    sets = of_three.nominal.sets
+    staged = search.staged
+    pairs = surest_pairs(staged, search, sets, 3, 0.3)
+    found = surest_triples(staged, search, sets, pairs)
+    at = sets.cell_xy[sets.cell]
+    assert found
+    thirds = {triple[:2]: triple for triple in found}
+    assert set(thirds) <= set(pairs)
+    for pair in pairs:
+        rows = np.searchsorted(sets.candidates, pair)
+        apart = np.hypot(*(at[:, None] - at[rows]).transpose(2, 0, 1)).min(axis=1)
+        others = sets.candidates[apart >= sets.min_distance - 1e-9].tolist()
+        of_sets = [search.points_of([*pair, other]) for other in others]
+        success = staged.successes(of_sets, staged.stages - 1)
+        triple = thirds.get(pair, pair)
+        chosen = staged.successes([search.points_of(triple)], staged.stages - 1)[0]
+        assert chosen == pytest.approx(success.max(), abs=1e-9)
+
+
+def test_sets_of_three_need_a_table_of_them(scored, search):
+    sets = scored.nominal.sets
+    pairs = surest_pairs(search.staged, search, sets, 1, 0.3)
+    assert surest_triples(search.staged, search, sets, pairs) == []
+
+
+def test_pairs_that_lose_nothing_get_no_third_member(of_three, search, monkeypatch):
+    sets = of_three.nominal.sets
+    pairs = surest_pairs(search.staged, search, sets, 1, 0.3)
+    monkeypatch.setattr(StagedSamples, "successes", lambda self, sets, stage: np.ones(len(sets)))
+    assert surest_triples(search.staged, search, sets, pairs) == []
+
+
+@pytest.mark.parametrize("members", [1, 2, 3])
+def test_the_surest_sets_around_a_set_are_those_of_a_plain_loop(search, rng, members):
+    around = []
+    for x in (0.8, 1.0, 1.2)[:members]:
+        values = np.array([x, -0.95 if x < 1.1 else 0.75, 3.0, 0.2]) + rng.normal(
+            scale=0.08, size=(6, 4)
+        )
+        around.append(search._evaluated(Points(values, np.zeros(6, dtype=np.int64))))
+    found = search._screened(around)
+    rows = itertools.product(range(6), repeat=members)
+    rows = [row for row in rows if np.count_nonzero(row) <= 2]
+    of_rows = [np.stack([a.values[k] for a, k in zip(around, row, strict=True)]) for row in rows]
+    allowed = [values for values in of_rows if search.space.allowed(values[None])[0]]
+    sets = [Points(values, np.zeros(members, dtype=np.int64)) for values in allowed]
+    best = np.sort(search.staged.successes(sets, 0))[::-1][: SETS[0]]
+    of_found = search.staged.successes([one.points for one in found], 0)
+    # Ties are decided by the scores; features are single precision.
+    np.testing.assert_allclose(np.sort(of_found)[::-1], best, atol=1e-6)
+    assert np.all(search.space.allowed(np.stack([one.values for one in found])))
 
 
 def test_walks_are_surer_in_all_samples_with_every_move(search, scored):
@@ -158,3 +222,11 @@ def test_success_and_its_pairs_through_the_product(scored, monkeypatch):
     best = Points(at, np.zeros(len(at), dtype=np.int64))
     found, before = successes(samples, trials.weights, [chosen, best])
     assert found >= before
+
+
+def test_sets_of_three_through_the_product(of_three, monkeypatch):
+    monkeypatch.setattr("tcs.placement.refinement.refined_file.FRESH_SAMPLES", 30)
+    options = {"objective": "success", "starts": 1, "rounds": 1, "samples": SAMPLES}
+    refined = tcs.refine(of_three, **options).nominal.refined
+    assert refined.origin.shape[1] == 3
+    assert refined.sizes.max() == 3

@@ -46,6 +46,8 @@ def refine_command(report: ScoreReport) -> str:
         words += ["--samples", str(found["samples"])]
     if found["objective"] == "score" and not found["keep_success"]:
         words.append("--no-keep-success")
+    if found.get("body_collisions", "paper") != "paper":
+        words += ["--body-collisions", found["body_collisions"]]
     words += ["--seed", str(found["seed"])]
     if report.shown.table != report.file.nominal_index:
         words += _observed(report)
