@@ -13,7 +13,8 @@ def test_json_and_text(tcs_command, tmp_path, capsys, monkeypatch):
     environment, path, out = (tmp_path / name for name in ("beside.yaml", "a.tcs", "b.tcs"))
     environment.write_text(BESIDE)
     tcs.save(path, tcs.score("shaving", environment))
-    ran = tcs_command("refine", path, "--out", out, "--starts", 1, "--rounds", 1, "--json")
+    words = ("refine", path, "--out", out, "--starts", 1, "--rounds", 1, "--json")
+    ran = tcs_command(*words, "--body-collisions", "none")
     assert (ran.code, ran.err) == (0, "")
     assert ran.json == {"file": str(out), **refinement_summary(tcs.load(out))}
     assert {"before", "after", "bound", "seconds"} <= set(ran.json)
@@ -21,6 +22,7 @@ def test_json_and_text(tcs_command, tmp_path, capsys, monkeypatch):
     printed = capsys.readouterr().out
     assert "no set between the grid's ends exceeds" in printed
     assert "success under error from" in printed
+    assert "collisions of the robot's body are ignored" in printed
     assert tcs_command("select", out, "--here", 1.4, -1.2, 180, "--gamma", 0).code == 0
 
 

@@ -8,6 +8,7 @@ from typing import Any
 from tcs.output.terminal.console import results_console
 from tcs.output.terminal.tables import members_table
 from tcs.output.words import scores_text
+from tcs.output.words.robustness import BODY_COLLISIONS
 
 
 def report_refined(result: Mapping[str, Any]) -> None:
@@ -31,6 +32,8 @@ def report_refined(result: Mapping[str, Any]) -> None:
             f"success {cause} from {success['before']:.1%} to {success['after']:.1%}, in "
             f"{success['samples']:,} other samples than those that chose the set"
         )
+        if not result["displaced"] and result["body_collisions"] != "paper":
+            out.print(f"under error, collisions {BODY_COLLISIONS[result['body_collisions']]}")
     if result.get("ball") is not None:
         ball = result["ball"]
         out.print(

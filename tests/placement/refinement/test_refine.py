@@ -359,6 +359,24 @@ def test_kept_environments_change_no_answer(scored):
     assert np.any(kept.reached(Points(low, points.arm)) != kept.reached(Points(high, points.arm)))
 
 
+@pytest.mark.parametrize("body_collisions", ["paper", "none"])
+def test_success_counts_the_collisions_that_were_asked_for(scored, monkeypatch, body_collisions):
+    monkeypatch.setattr("tcs.placement.refinement.refined_file.FRESH_SAMPLES", 200)
+    options = {"objective": "success", "starts": 1, "rounds": 1, "samples": 2}
+    refined = tcs.refine(scored, **options, body_collisions=body_collisions)
+    found = refinement_summary(refined)
+    assert found["body_collisions"] == body_collisions
+    members = np.array(scored.nominal.sets.best)
+    before = {}
+    for rule in ("paper", "none"):
+        trials = Trials.of(scored, body_collisions=rule)
+        offsets = trials.errors.draw(200, 0, stream="refinement check")
+        reached = np.logical_or.reduce(trials.reached(members, offsets))
+        before[rule] = float((reached @ trials.weights).mean())
+    assert found["success"]["before"] == pytest.approx(before[body_collisions], abs=1e-12)
+    assert before["none"] > before["paper"]
+
+
 @pytest.mark.parametrize("objective", ["success", "margin", "ball"])
 def test_success_is_judged_on_other_samples(scored, monkeypatch, objective):
     monkeypatch.setattr("tcs.placement.refinement.refined_file.FRESH_SAMPLES", 200)
@@ -389,6 +407,7 @@ def test_the_score_of_toc_is_that_of_the_set(scored):
     ("options", "error", "message"),
     [
         ({"objective": "speed"}, UnknownNameError, "unknown objective 'speed'"),
+        ({"body_collisions": "some"}, UnknownNameError, "unknown body collisions 'some'"),
         ({"starts": 0}, TcsError, "starts is 0"),
         ({"rounds": 0}, TcsError, "rounds is 0"),
         ({"samples": 0}, TcsError, "samples is 0"),
