@@ -58,6 +58,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "isotropy_bound": (),
     "optimum": (),
     "surest_search": (),
+    "surest_rules": (),
     "toc": (),
     "placing": (),
     "obstacles": (),

@@ -65,7 +65,14 @@ class PerturbedPoints:
 
     def reached(self, points: Points) -> BoolArray:
         """Return which goals each configuration reaches in each sample, shape (n, samples, G)."""
-        out = np.zeros((len(points.values), self.samples, self.trials.weights.size), dtype=np.bool_)
+        return np.asarray(self.reasons(points) == Reason.REACHED)
+
+    def reasons(self, points: Points) -> NDArray[np.uint8]:
+        """Return why each configuration reaches a goal in a sample or not, shape (n, samples, G).
+
+        Values are those of `Reason`.
+        """
+        out = np.zeros((len(points.values), self.samples, self.trials.weights.size), dtype=np.uint8)
         parts = [
             part
             for arm in np.unique(points.arm)
@@ -74,7 +81,7 @@ class PerturbedPoints:
 
         def fill(part: _Part) -> None:
             found = part.scenes.scores(part.poses, part.run)
-            out[part.row, part.run.start : part.run.stop] = found.reason == Reason.REACHED
+            out[part.row, part.run.start : part.run.stop] = found.reason
 
         Parallel(n_jobs=self.jobs, prefer="threads")(delayed(fill)(part) for part in parts)
         return out

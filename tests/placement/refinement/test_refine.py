@@ -342,6 +342,18 @@ def test_perturbed_points_on_the_grid_are_those_of_trials(scored):
     assert found.any()
 
 
+def test_reasons_without_errors_are_those_of_the_grid(scored):
+    trials = Trials.of(scored, body_collisions="all")
+    still = {name: np.zeros(2) for name in trials.errors.draw(1, 0)}
+    members = np.arange(0, scored.configurations.size, 3)
+    at = np.stack([*scored.configurations.values(members).values()], axis=1)
+    points = Points(at, np.zeros(len(at), dtype=np.int64))
+    found = PerturbedPoints(trials, still, 2).reasons(points)
+    expected = scored.nominal.scores.reason[members]
+    np.testing.assert_array_equal(found, np.stack([expected, expected], axis=1))
+    assert len(np.unique(found)) > 2
+
+
 def test_kept_environments_change_no_answer(scored):
     trials = Trials.of(scored)
     offsets = trials.errors.draw(12, 3)
