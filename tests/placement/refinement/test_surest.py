@@ -10,9 +10,10 @@ import pytest
 import tcs
 from tcs.placement.refinement import PointScorer
 from tcs.placement.refinement.floor import RememberedSamples, successes
+from tcs.placement.refinement.search import Evaluated
 from tcs.placement.refinement.space import Space
 from tcs.placement.refinement.staged import StagedSamples, best_pairs
-from tcs.placement.refinement.surest import SETS, SurestSearch, surest_pairs, surest_triples
+from tcs.placement.refinement.surest import SurestSearch, surest_pairs, surest_triples
 from tcs.placement.robustness import PerturbedPoints, Trials
 from tcs.placement.tables import Points
 from tests.beside import BESIDE
@@ -94,6 +95,44 @@ def test_the_best_pairs_are_those_of_a_plain_loop(made, rng, monkeypatch, count)
     np.testing.assert_allclose(found, sorted(success.values())[::-1][:count], atol=1e-6)
 
 
+class Odd:
+    """A space that allows sets with an odd sum of their first values, and all single members."""
+
+    def allowed(self, members):
+        return (members[:, :, 0].sum(axis=1) % 2 == 1) | (members.shape[1] == 1)
+
+
+@pytest.mark.parametrize("members", [1, 2, 3])
+def test_two_members_change_together_as_in_a_plain_loop(rng, monkeypatch, members):
+    monkeypatch.setattr("tcs.placement.refinement.surest.SETS", (3, 2, 2, 1))
+    weights = np.array([0.5, 0.3, 0.2])
+    samples = Made(rng.uniform(size=(5 * members, 30, 3)) < 0.4)
+    staged = StagedSamples.of(samples, weights)
+    search = SurestSearch.of(None, Odd(), staged, rng)
+    nothing = np.zeros((5, 3))
+    choices = [
+        Evaluated(
+            *points(*range(5 * i, 5 * i + 5)),
+            nothing > 0.0,
+            nothing,
+            nothing,
+            nothing > 0.0,
+            nothing,
+        )
+        for i in range(members)
+    ]
+    found = [tuple(one.values[:, 0].astype(int) % 5) for one in search._screened(choices)]
+    success = {}
+    for row in itertools.product(range(5), repeat=members):
+        numbers = [5 * i + k for i, k in enumerate(row)]
+        if np.count_nonzero(row) <= 2 and (members == 1 or sum(numbers) % 2):
+            of_set = points(*numbers)
+            success[row] = staged.successes([of_set], 0)[0]
+    # Features are single precision.
+    best = sorted(success.values())[::-1][:3]
+    np.testing.assert_allclose([success[row] for row in found], best, atol=1e-6)
+
+
 @pytest.fixture(scope="module")
 def environment(tmp_path_factory):
     path = tmp_path_factory.mktemp("beside") / "beside.yaml"
@@ -166,27 +205,6 @@ def test_pairs_that_lose_nothing_get_no_third_member(of_three, search, monkeypat
     pairs = surest_pairs(search.staged, search, sets, 1, 0.3)
     monkeypatch.setattr(StagedSamples, "successes", lambda self, sets, stage: np.ones(len(sets)))
     assert surest_triples(search.staged, search, sets, pairs) == []
-
-
-@pytest.mark.parametrize("members", [1, 2, 3])
-def test_the_surest_sets_around_a_set_are_those_of_a_plain_loop(search, rng, members):
-    around = []
-    for x in (0.8, 1.0, 1.2)[:members]:
-        values = np.array([x, -0.95 if x < 1.1 else 0.75, 3.0, 0.2]) + rng.normal(
-            scale=0.08, size=(6, 4)
-        )
-        around.append(search._evaluated(Points(values, np.zeros(6, dtype=np.int64))))
-    found = search._screened(around)
-    rows = itertools.product(range(6), repeat=members)
-    rows = [row for row in rows if np.count_nonzero(row) <= 2]
-    of_rows = [np.stack([a.values[k] for a, k in zip(around, row, strict=True)]) for row in rows]
-    allowed = [values for values in of_rows if search.space.allowed(values[None])[0]]
-    sets = [Points(values, np.zeros(members, dtype=np.int64)) for values in allowed]
-    best = np.sort(search.staged.successes(sets, 0))[::-1][: SETS[0]]
-    of_found = search.staged.successes([one.points for one in found], 0)
-    # Ties are decided by the scores; features are single precision.
-    np.testing.assert_allclose(np.sort(of_found)[::-1], best, atol=1e-6)
-    assert np.all(search.space.allowed(np.stack([one.values for one in found])))
 
 
 def test_walks_are_surer_in_all_samples_with_every_move(search, scored):
