@@ -343,7 +343,14 @@ JOBS_OF_SETS = {
     ),
     "tcs.placement.refinement.refine": (
         RefineRequest,
-        {"objective": "margin", "starts": 2, "rounds": 3, "samples": 4, "keep_success": False},
+        {
+            "objective": "margin",
+            "starts": 2,
+            "rounds": 3,
+            "samples": 4,
+            "keep_success": False,
+            "body_collisions": "none",
+        },
         lambda given: given,
     ),
     "tcs.motion.examine.examine": (
