@@ -280,7 +280,8 @@ def _kept_sets(
     bounds: Bounds, members: tuple[IntArray, ...], group: IntArray, least: float
 ) -> tuple[FloatArray, tuple[IntArray, ...]]:
     """Return utility and members of the kept sets of at least this utility, shapes (n,)."""
-    cost = tour_costs(bounds.legs, members)
+    # Where travel has no weight, tours need not be summed: all costs are finite.
+    cost = tour_costs(bounds.legs, members) if bounds.travel else np.zeros(members[0].size)
     # The exact travel cost rejects most sets before their scores, which take longer.
     feasible = np.flatnonzero(bounds.of_set(group, members, cost) >= least)
     members, cost = tuple(member[feasible] for member in members), cost[feasible]
