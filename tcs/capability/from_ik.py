@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
 
@@ -67,18 +66,16 @@ def map_from_ik(
     camera_view(reach, grid, map_type, view_rule)
     radius = reach.length if radius is None else radius
     cells = cells_around(grid, reach.shoulder, radius)
-    R_BT, p_BT = grid.tool_in_base(cells)
-    solved = solved_in_blocks(reach, R_BT, p_BT, blocks, jobs=jobs, on_progress=on_progress)
-    rows = np.flatnonzero(solved.reached)
-    joints = solved.joints[rows]
-    found = finished_map(
-        reach, grid, map_type, cells[rows], p_BT[rows], solved.manipulability[rows], joints,
-        view_rule, {"radius": float(radius), "cells_considered": len(cells)},
-    )  # fmt: skip
+    solved = solved_in_blocks(reach, grid, cells, blocks, jobs=jobs, on_progress=on_progress)
+    reached = cells[solved.rows]
+    _, p_BT = grid.tool_in_base(reached)
     # Scoring found each posture free at this torso height; the joints of the map are in single
     # precision, which moves a posture by 1e-8 m, perhaps to within the contact margin.
-    here = np.uint32(1) << np.uint32(reach.level)
-    return replace(found, free_torso_heights=found.free_torso_heights | here)
+    free = solved.free_torso_heights | np.uint32(1) << np.uint32(reach.level)
+    return finished_map(
+        reach, grid, map_type, reached, p_BT, solved.manipulability, solved.joints, free,
+        view_rule, {"radius": float(radius), "cells_considered": len(cells)},
+    )  # fmt: skip
 
 
 def finished_map(
@@ -89,6 +86,7 @@ def finished_map(
     p_BT: FloatArray,
     manipulability: NDArray[np.float32] | FloatArray,
     joints: NDArray[np.float32] | FloatArray,
+    free_torso_heights: NDArray[np.uint32],
     view_rule: str,
     metadata: dict[str, Any],
 ) -> CapabilityMap:
@@ -102,6 +100,8 @@ def finished_map(
         p_BT: Tool positions in B at the map's torso height [m], shape (n, 3).
         manipulability: Manipulability of the postures, shape (n,).
         joints: Arm joints [rad], shape (n, 7).
+        free_torso_heights: Torso heights at which each posture is free, bit i for the i-th of
+            them, shape (n,).
         view_rule: Visibility rule.
         metadata: Further metadata.
 
@@ -121,7 +121,7 @@ def finished_map(
         visibility=visible[order].astype(np.float32),
         torso_heights=np.array(reach.torso_heights, dtype=np.float64),
         torso_height=float(reach.torso_height),
-        free_torso_heights=reach.free_torso_heights(np.asarray(joints[order], dtype=np.float64)),
+        free_torso_heights=free_torso_heights[order],
         manipulability_scale=manipulability_scale(reach),
         metadata={
             "robot": reach.robot_reference,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -114,13 +114,12 @@ def map_from_recording(
     rows = order[first]
     chosen = kept[rows]
     joints = recording.joints[chosen]
+    # The arm was at this torso height, even where the enclosing shapes overlap.
+    free = reach.free_torso_heights(joints) | np.uint32(1) << np.uint32(reach.level)
     capability = finished_map(
         reach, grid, ITCM, near.cells[rows], p_BT[chosen], reach.manipulability(joints), joints,
-        view_rule, {"samples": len(recording), "height": height},
+        free, view_rule, {"samples": len(recording), "height": height},
     )  # fmt: skip
-    # The arm was at this torso height, even where the enclosing shapes overlap.
-    here = np.uint32(1) << np.uint32(reach.level)
-    capability = replace(capability, free_torso_heights=capability.free_torso_heights | here)
     offsets = np.abs(np.hstack([near.offset[rows], angles[rows]]))
     return RecordedMap(
         capability, len(recording), wrong_height, len(recording) - wrong_height - len(kept), offsets

@@ -3,89 +3,119 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tcs.capability.reach import OnProgress, Reach, Solved
+from tcs.capability.grid import CellArray, MapGrid
+from tcs.capability.reach import OnProgress, Reach
 from tcs.errors import StoreFormatError
 from tcs.files.blocks import BlockFolder, Blocks, opened_if
 from tcs.files.compression import AtMost, compress, decompress
-from tcs.kernel.arrays import FloatArray
 from tcs.model.program import program_digest
 
 BLOCK = 24 * 2048
-"""Tool poses of a block: some seconds of work."""
+"""Cells of a block: some seconds of work."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SolvedCells:
+    """The cells that are reached, with the best posture of each."""
+
+    rows: NDArray[np.int64]
+    """Their rows among the cells that were considered, ascending, shape (n,)."""
+    manipulability: NDArray[np.float32]
+    """The measure of the posture, shape (n,)."""
+    joints: NDArray[np.float32]
+    """The posture [rad], shape (n, 7)."""
+    free_torso_heights: NDArray[np.uint32]
+    """Torso heights at which it is free of contact, as `Reach.free_torso_heights`, shape (n,)."""
 
 
 def solved_in_blocks(
     reach: Reach,
-    R_BT: FloatArray,
-    p_BT: FloatArray,
+    grid: MapGrid,
+    cells: CellArray,
     folder: BlockFolder | None,
     *,
     jobs: int,
     on_progress: OnProgress | None,
-) -> Solved:
-    """Return the best collision-free posture for each tool pose, as `Reach.solve`.
+) -> SolvedCells:
+    """Return which cells are reached, with the best collision-free posture of each.
 
     Args:
         reach: The robot.
-        R_BT: Tool orientations in B, shape (n, 3, 3).
-        p_BT: Tool positions in B [m], shape (n, 3).
+        grid: The grid of the cells.
+        cells: The cells to consider, shape (m, 5).
         folder: Folder in which finished blocks are kept; None to keep none.
         jobs: Number of threads; the results do not depend on it.
-        on_progress: Called with the number of poses done and of all.
+        on_progress: Called with the number of cells done and of all.
 
     Raises:
         OutputError: If blocks cannot be kept, or another process is at work in the folder.
     """
-    if folder is None:
-        return reach.solve(R_BT, p_BT, jobs=jobs, on_progress=on_progress)
-    count = len(p_BT)
-    solved = Solved(
-        np.zeros(count, np.bool_), np.zeros(count, np.float32), np.zeros((count, 7), np.float32)
+    with opened_if(folder, lambda: _key(reach, grid)) as blocks:
+        found = list(_parts(reach, grid, cells, blocks, jobs, on_progress))
+    return SolvedCells(
+        np.concatenate([np.empty(0, np.int64), *(first + part.rows for first, part in found)]),
+        *(
+            np.concatenate([getattr(part, name) for _, part in found])
+            for name in ("manipulability", "joints", "free_torso_heights")
+        ),
     )
-    with opened_if(folder, lambda: _key(reach)) as blocks:
-        assert blocks is not None
-        for first in range(0, count, BLOCK):
-            rows = slice(first, min(first + BLOCK, count))
-            found = _solved(
-                reach, R_BT[rows], p_BT[rows], blocks, jobs, _offset(on_progress, first, count)
-            )
-            solved.reached[rows] = found.reached
-            solved.manipulability[rows] = found.manipulability
-            solved.joints[rows] = found.joints
-    return solved
 
 
-def _key(reach: Reach) -> str:
-    """Return the hash of what all postures of a robot follow from, but for the tool poses."""
-    parts = ("cells", program_digest(), reach.lowered.digest(), str(reach.level), reach.measure)
+def _key(reach: Reach, grid: MapGrid) -> str:
+    """Return the hash of what all postures of a robot follow from, but for the cells."""
+    parts = (
+        *("cells", program_digest(), reach.lowered.digest(), str(reach.level), reach.measure),
+        *(repr(grid.step), str(grid.yaw_bins), repr(grid.tilts)),
+    )
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()
+
+
+def _parts(
+    reach: Reach,
+    grid: MapGrid,
+    cells: CellArray,
+    blocks: Blocks | None,
+    jobs: int,
+    on_progress: OnProgress | None,
+) -> Iterator[tuple[int, SolvedCells]]:
+    """Yield the first row of each block, and the cells of it that are reached."""
+    for first in range(0, len(cells), BLOCK):
+        part = cells[first : first + BLOCK]
+        tell = _offset(on_progress, first, len(cells))
+        name = hashlib.sha256(np.asarray(part, dtype="<i4").tobytes()).hexdigest()[:24]
+        found = None
+        if blocks is not None:
+            found = blocks.load(name, partial(_decode, count=len(part)))
+        if found is None:
+            found = _solved(reach, grid, part, jobs, tell)
+            if blocks is not None:
+                blocks.save(name, _encode(found, len(part)))
+        else:
+            tell(len(part), len(part))
+        yield first, found
 
 
 def _solved(
     reach: Reach,
-    R_BT: FloatArray,
-    p_BT: FloatArray,
-    blocks: Blocks,
+    grid: MapGrid,
+    cells: CellArray,
     jobs: int,
     on_progress: Callable[[int, int], None],
-) -> Solved:
-    """Return the postures of one block."""
-    sha = hashlib.sha256()
-    for array in (R_BT, p_BT):
-        sha.update(np.asarray(array, dtype="<f8").tobytes())
-    name = sha.hexdigest()[:24]
-    found = blocks.load(name, lambda content: _decode(content, len(p_BT)))
-    if found is None:
-        found = reach.solve(R_BT, p_BT, jobs=jobs, on_progress=on_progress)
-        blocks.save(name, _encode(found))
-    else:
-        on_progress(len(p_BT), len(p_BT))
-    return found
+) -> SolvedCells:
+    """Return the cells of one block that are reached."""
+    solved = reach.solve(*grid.tool_in_base(cells), jobs=jobs, on_progress=on_progress)
+    joints = solved.joints[solved.reached]
+    free = reach.free_torso_heights(joints.astype(np.float64), jobs=jobs)
+    rows = np.flatnonzero(solved.reached)
+    return SolvedCells(rows, solved.manipulability[rows], joints, free)
 
 
 def _offset(on_progress: OnProgress | None, before: int, total: int) -> Callable[[int, int], None]:
@@ -98,21 +128,23 @@ def _offset(on_progress: OnProgress | None, before: int, total: int) -> Callable
     return told
 
 
-def _encode(solved: Solved) -> dict[str, Any]:
+def _encode(found: SolvedCells, count: int) -> dict[str, Any]:
+    reached = np.zeros(count, np.bool_)
+    reached[found.rows] = True
     return {
-        "reached": compress(np.packbits(solved.reached)),
-        "manipulability": compress(solved.manipulability[solved.reached]),
-        "joints": compress(solved.joints[solved.reached]),
+        "reached": compress(np.packbits(reached)),
+        "manipulability": compress(found.manipulability),
+        "joints": compress(found.joints),
+        "free_torso_heights": compress(found.free_torso_heights),
     }
 
 
-def _decode(content: dict[str, Any], count: int) -> Solved:
+def _decode(content: dict[str, Any], count: int) -> SolvedCells:
     packed = decompress(content, "reached", "u1", (-(-count // 8),))
-    reached = np.unpackbits(packed, count=count).astype(np.bool_)
-    manipulability, joints = np.zeros(count, np.float32), np.zeros((count, 7), np.float32)
+    rows = np.flatnonzero(np.unpackbits(packed, count=count))
     values = decompress(content, "manipulability", "f4", (AtMost(count),))
     postures = decompress(content, "joints", "f4", (AtMost(count), 7))
-    if not len(values) == len(postures) == np.count_nonzero(reached):
-        raise StoreFormatError("has postures of other poses than are reached")
-    manipulability[reached], joints[reached] = values, postures
-    return Solved(reached, manipulability, joints)
+    free = decompress(content, "free_torso_heights", "u4", (AtMost(count),))
+    if not rows.size == len(values) == len(postures) == len(free):
+        raise StoreFormatError("has postures of other cells than are reached")
+    return SolvedCells(rows, values, postures, free)

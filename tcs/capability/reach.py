@@ -218,15 +218,24 @@ class Reach:
         free_postures(problem, new_workspace(problem), 0, _writable(joints), free)
         return free
 
-    def free_torso_heights(self, joints: FloatArray) -> NDArray[np.uint32]:
+    def free_torso_heights(self, joints: FloatArray, *, jobs: int = 1) -> NDArray[np.uint32]:
         """Return the torso heights free of contact, bit i for `torso_heights[i]`, shape (n,).
 
         Args:
             joints: Arm joints [rad], shape (n, 7).
+            jobs: Number of threads; the results do not depend on it.
         """
         bits = np.zeros(len(joints), np.uint32)
-        for level in range(len(self.torso_heights)):
-            bits |= self.free(joints, level).astype(np.uint32) << np.uint32(level)
+
+        def fill(part: slice, level: int) -> tuple[slice, NDArray[np.uint32]]:
+            return part, self.free(joints[part], level).astype(np.uint32) << np.uint32(level)
+
+        parts = [slice(i, i + _SLICE) for i in range(0, len(joints), _SLICE)]
+        runs = (
+            delayed(fill)(part, level) for part in parts for level in range(len(self.torso_heights))
+        )
+        for part, of_level in Parallel(jobs, "threading", return_as="generator_unordered")(runs):
+            bits[part] |= of_level
         return bits
 
     def _at(self, level: int) -> Problem:

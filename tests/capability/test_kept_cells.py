@@ -70,6 +70,16 @@ def test_an_interrupted_map_is_continued_with_the_same_cells(run, plain, tmp_pat
     assert run(restart=True)[1] == everything
 
 
+def test_free_torso_heights_are_kept_too(run, plain, monkeypatch):
+    run()
+
+    def compute(*_arguments, **_options):
+        raise AssertionError("computed again")
+
+    monkeypatch.setattr(Reach, "free", compute)
+    assert_same(run()[0], plain)
+
+
 def test_another_measure_and_height_are_solved(run, reach, plain):
     run()
     other = Reach(reach.robot, torso_height=reach.torso_height, measure="isotropy")
