@@ -44,18 +44,17 @@ def test_what_fails_to_load_is_told_as_want_of_memory_only_with_a_limit(monkeypa
     ids=["kept", "compiled"],
 )
 def test_compiling_needs_more_room_than_loading_machine_code(is_kept, needed, monkeypatch):
-    # The package's attribute of this name is the function.
-    sweep = import_module("tcs.placement.scoring.sweep")
+    kernel_start = import_module("tcs.placement.scoring.kernel_start")
     asked = []
 
     def refuse(room):
         asked.append(room)
         raise MemoryError
 
-    monkeypatch.setattr(sweep, "is_compiled", lambda _: is_kept)
-    monkeypatch.setattr(sweep, "check_room", refuse)
+    monkeypatch.setattr(kernel_start, "is_compiled", lambda _: is_kept)
+    monkeypatch.setattr(kernel_start, "check_room", refuse)
     with pytest.raises(MemoryError):
-        sweep.warm_up(SimpleNamespace(joints=6))
+        kernel_start.warm_up(SimpleNamespace(joints=6))
     assert asked == [needed]
 
 

@@ -106,6 +106,7 @@ def reasons_for_people(
             step(block.size)
         if not missing:
             continue
+        trials.start.ensure()
         prepared = list(_prepared(trials, poses, scales, columns, offsets))
         batches = [block[i : i + BATCH] for block in missing for i in range(0, block.size, BATCH)]
         parallel = Parallel(n_jobs=jobs, prefer="threads", return_as="generator")

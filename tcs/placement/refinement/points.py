@@ -19,8 +19,9 @@ from tcs.model.grid import ROBOT_AXES, Grid
 from tcs.model.scene import LoweredScene, Scene, environment_at, torso_at
 from tcs.placement.constraints import Footprint
 from tcs.placement.scoring.job import Job
+from tcs.placement.scoring.kernel_start import warm_up
 from tcs.placement.scoring.rebuild import rebuild_scene
-from tcs.placement.scoring.sweep import name_contacts, warm_up
+from tcs.placement.scoring.sweep import name_contacts
 from tcs.placement.store import ScoreFile, files_of_arms
 from tcs.placement.tables import Points, Reason, ScoreTable
 

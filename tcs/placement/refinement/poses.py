@@ -19,8 +19,8 @@ from tcs.model.robots import RobotFile
 from tcs.model.scene import EMPTY_ENVIRONMENT, Scene, SceneSpec, lower
 from tcs.placement.constraints import Obstacle
 from tcs.placement.refinement.points import PointScores
+from tcs.placement.scoring.kernel_start import warm_up
 from tcs.placement.scoring.obstacles import with_obstacles
-from tcs.placement.scoring.sweep import warm_up
 from tcs.placement.tables import Points, Reason
 
 BATCH = 64

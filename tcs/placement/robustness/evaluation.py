@@ -176,9 +176,9 @@ def evaluate(
     """
     check_draws(samples, seed)
     begun = time.perf_counter()
-    compiling = 0.0
+    before = 0.0
     if isinstance(file, Trials):
-        trials = file
+        trials, before = file, file.compile_seconds
         if errors is not None or table is not None or body_collisions is not None:
             raise TcsError(
                 "Trials already include errors, table and body collisions. Set them in Trials.of."
@@ -191,7 +191,6 @@ def evaluate(
             body_collisions="paper" if body_collisions is None else body_collisions,
             on_compile=on_compile,
         )
-        compiling = trials.compile_seconds
     offsets = trials.errors.draw(samples, seed, stream=stream)
     sets, choices = _chosen(trials.scored, select, members, samples, seed)
     is_drawn = isinstance(select, str) and select in _DRAWN
@@ -220,7 +219,7 @@ def evaluate(
         errors=trials.errors,
         body_collisions=trials.body_collisions,
         seed=seed,
-        seconds=time.perf_counter() - begun - compiling,
+        seconds=time.perf_counter() - begun - (trials.compile_seconds - before),
         observed=state_to_json(trials.file.observed_axes, trials.observed),
         about={
             "task": trials.job.task.name,

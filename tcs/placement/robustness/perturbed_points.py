@@ -132,6 +132,7 @@ class PerturbedPoints:
 
         Its arrays take a call of Drake for each sample: the last states are kept.
         """
+        self.trials.start.ensure()
         key = (id(arm), *state.items())
         known = self.environments.pop(key, None)
         if known is None:

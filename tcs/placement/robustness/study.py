@@ -177,7 +177,7 @@ def study_rows(
     """
     if not is_compiled():
         # Compile once, not in every process.
-        Trials.of(load_scores(paths[0]), on_compile=on_compile)
+        Trials.of(load_scores(paths[0]), on_compile=on_compile).start.ensure()
     done = []
     # Processes, because much of the work holds the global interpreter lock.
     work = Parallel(n_jobs=min(jobs, len(paths)), return_as="generator")

@@ -27,8 +27,8 @@ from tcs.placement.robustness.error_model import ErrorModel, Offsets
 from tcs.placement.robustness.kept_runs import kept_runs, states_digest, trials_key
 from tcs.placement.robustness.perturbed_scenes import BATCH, BasePoses, PerturbedScenes, Run
 from tcs.placement.scoring.job import Job
+from tcs.placement.scoring.kernel_start import KernelStart
 from tcs.placement.scoring.rebuild import rebuild_scene
-from tcs.placement.scoring.sweep import warm_up
 from tcs.placement.store import ScoreFile, StateTables, files_of_arms
 from tcs.placement.tables import Reason
 
@@ -101,8 +101,8 @@ class Trials:
     """Collisions of the robot's body that count, one of `BODY_COLLISIONS`."""
     arms: tuple[ArmTrials, ...]
     """The robot with each arm that configurations use, in the order of the grid."""
-    compile_seconds: float
-    """Time for compiling the kernel or loading its machine code [s]."""
+    start: KernelStart
+    """The start of the kernel, which is put off until something has to be scored."""
     blocks: Blocks | None = None
     """Where the goals that are reached are kept; None to keep none."""
 
@@ -139,12 +139,12 @@ class Trials:
                 f"There is no table {table}; the file has {len(file.tables)}, counted from 0."
             )
         measure = str(file.metadata["measure"])
-        seconds = sum(
-            warm_up(build_problem(lowered.arrays, lowered.grid, measure), on_compile)
-            for *_, lowered in built
+        start = KernelStart(
+            lambda: (build_problem(lowered.arrays, lowered.grid, measure) for *_, lowered in built),
+            on_compile,
         )
         trials = cls.built(file, chosen, built, errors, body_collisions)
-        return dataclasses.replace(trials, compile_seconds=seconds)
+        return dataclasses.replace(trials, start=start)
 
     @classmethod
     def built(
@@ -155,7 +155,7 @@ class Trials:
         errors: Errors = None,
         body_collisions: str = "paper",
     ) -> Trials:
-        """Return the trials of a table whose scene is built, once for each arm, and kernel warm.
+        """Return the trials of a table whose scene is built, once for each arm, and kernel started.
 
         Args:
             file: A score file.
@@ -168,7 +168,8 @@ class Trials:
             ArmTrials(job, scene, lowered, counted_pairs(scene, lowered, body_collisions))
             for job, scene, lowered in built
         )
-        return cls(file, table, ErrorModel.of(built[0][1], errors), body_collisions, arms, 0.0)
+        errors_of = ErrorModel.of(built[0][1], errors)
+        return cls(file, table, errors_of, body_collisions, arms, KernelStart(tuple))
 
     def at_table(self, table: int) -> Trials:
         """Return the trials of another table of the same file."""
@@ -183,6 +184,11 @@ class Trials:
         """
         with opened_if(folder, lambda: self.key) as blocks:
             yield dataclasses.replace(self, blocks=blocks) if blocks is not None else self
+
+    @property
+    def compile_seconds(self) -> float:
+        """Time that compiling the kernel, or loading its machine code, has taken so far [s]."""
+        return self.start.seconds
 
     @property
     def key(self) -> str:
@@ -395,6 +401,7 @@ class Trials:
 
     def _scenes(self, state: int, offsets: Offsets) -> PerturbedScenes:
         """Return one state of the environment, with its arm, in each sample, as arrays."""
+        self.start.ensure()
         positions, _ = self.positions(state, offsets)
         arm = self.arm_of(state * self.grid.state_size)
         return arm.scenes(positions, arm.lowered, self._measure)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tcs.errors import RobotError
 from tcs.files.mapped import chunks, large_zeros
 from tcs.placement.constraints.scored import KEY as CONSTRAINTS
-from tcs.placement.scoring.sweep import ANALYTIC, NUMERIC
+from tcs.placement.scoring.kernel_start import ANALYTIC, NUMERIC
 from tcs.placement.store import ARMS, OF_ARM, ScoreFile
 from tcs.placement.tables import ScoreTable
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from tcs.kernel.sweep import gripper_contacts
 from tcs.placement.scoring.blocks import BLOCK, Block
 from tcs.placement.scoring.engines import SLICE, Part, Work
 from tcs.placement.scoring.job import Job
-from tcs.placement.scoring.sweep import warm_up
+from tcs.placement.scoring.kernel_start import warm_up
 
 SAMPLES = 24
 """Slices that are scored, spread evenly over the grid. Environment states and base positions differ
@@ -65,20 +66,48 @@ def estimate(job: Job, *, measure: str, jobs: int, slices: int = SAMPLES) -> Est
     problem = build_problem(lowered.arrays, lowered.grid, measure)
     warm_up(problem)
     work = Work(problem, gripper_contacts(problem))
-    size, goals = job.scored_grid.size, len(job.task.goals)
+    size = job.scored_grid.size
     starts = np.unique(np.linspace(0, max(0, size - SLICE), slices).astype(int))
-    seconds, joints, disk, scored = [], 0, 0, 0
-    for start in starts.tolist():
-        begun = time.thread_time()
-        block = work.score(Part(start, min(start + SLICE, size)))
-        seconds.append(time.thread_time() - begun)
-        scored += len(block.reason)
-        joints += block.joints.nbytes
-        disk += _stored_bytes(block)
-    all_slices = size / SLICE / jobs
+    scored = [
+        scored_slice(work, Part(start, min(start + SLICE, size))) for start in starts.tolist()
+    ]
+    return estimate_from(job, scored, jobs=jobs)
+
+
+class ScoredSlice(NamedTuple):
+    """What scoring some configurations of a grid took."""
+
+    configurations: int
+    seconds: float
+    """Processor time [s]."""
+    joints_bytes: int
+    """Size of the joint angles of the reached pairs."""
+    disk_bytes: int
+    """Size of the scores in a file."""
+
+
+def scored_slice(work: Work, part: Part) -> ScoredSlice:
+    """Score a part of a grid and return what it took."""
+    begun = time.thread_time()
+    block = work.score(part)
+    seconds = time.thread_time() - begun
+    return ScoredSlice(len(block.reason), seconds, block.joints.nbytes, _stored_bytes(block))
+
+
+def estimate_from(job: Job, slices: Sequence[ScoredSlice], *, jobs: int) -> Estimate:
+    """Estimate what scoring a job would take from some slices, of equal size, of such grids.
+
+    Args:
+        job: The job.
+        slices: What scoring them took.
+        jobs: Number of threads.
+    """
+    size, goals = job.scored_grid.size, len(job.task.goals)
+    scored, _, joints, disk = (sum(values) for values in zip(*slices, strict=True))
+    seconds = [one.seconds for one in slices]
+    spread = float(np.std(seconds, ddof=1)) if len(seconds) > 1 else 0.0
     arrays = [size * goals * width for width in PAIR_BYTES]
     mapped = sum(array for array in arrays if array >= LEAST_BYTES)
-    spread = float(np.std(seconds, ddof=1)) if len(seconds) > 1 else 0.0
     return Estimate(
         task=job.task.name,
         environment=job.spec.environment.name,
@@ -87,7 +116,7 @@ def estimate(job: Job, *, measure: str, jobs: int, slices: int = SAMPLES) -> Est
         goals=goals,
         blocks=-(-size // BLOCK),
         scoring_seconds=sum(seconds) / scored * size / jobs,
-        scoring_seconds_error=all_slices * spread / len(seconds) ** 0.5,
+        scoring_seconds_error=len(seconds) ** 0.5 * spread / scored * size / jobs,
         memory_bytes=sum(arrays) - mapped + round(joints / scored * size),
         scratch_bytes=mapped,
         disk_bytes=round(disk / scored * size),

@@ -16,9 +16,9 @@ from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scans
 from tcs.model.tasks import partners
 from tcs.placement.scoring.drake_check import DrakeChecker, Finding, of_both
 from tcs.placement.scoring.hands import whole_task
+from tcs.placement.scoring.kernel_start import ANALYTIC, NUMERIC, ik_of
 from tcs.placement.scoring.rebuild import rebuild_scenes
 from tcs.placement.scoring.strata import Pairs
-from tcs.placement.scoring.sweep import ANALYTIC, NUMERIC, ik_of
 from tcs.placement.scoring.together import Hands, searched
 from tcs.placement.store import ScoreFile, StateTables
 

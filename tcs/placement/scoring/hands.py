@@ -17,8 +17,8 @@ from tcs.model.scene import SceneSpec
 from tcs.model.tasks import Task, partners
 from tcs.placement.scoring.arms import filled, shifted
 from tcs.placement.scoring.job import BARE, Job
+from tcs.placement.scoring.kernel_start import ANALYTIC, NUMERIC
 from tcs.placement.scoring.person import person_entry
-from tcs.placement.scoring.sweep import ANALYTIC, NUMERIC
 from tcs.placement.scoring.together import Hands, PlacedGoal, together
 from tcs.placement.store import HANDS, OF_ARM, ScoreFile
 from tcs.placement.tables import Reason, ScoreTable

@@ -20,9 +20,9 @@ from tcs.model.tasks import Task
 from tcs.placement.constraints import Constraints
 from tcs.placement.scoring.approaches import approach_lines
 from tcs.placement.scoring.job import Job
+from tcs.placement.scoring.kernel_start import warm_up
 from tcs.placement.scoring.offline import NO_CONSTRAINTS, ScoringSetup
 from tcs.placement.scoring.sets import SetOptions
-from tcs.placement.scoring.sweep import warm_up
 from tcs.placement.store import ScoreFile
 
 ObservationLike = Observation | Mapping[str, float]

@@ -7,7 +7,7 @@ from typing import Any
 
 from tcs.model.grid import Grid
 from tcs.placement.constraints import constraint_texts
-from tcs.placement.scoring.sweep import ANALYTIC
+from tcs.placement.scoring.kernel_start import ANALYTIC
 from tcs.placement.store import ScoreFile, state_to_json
 
 

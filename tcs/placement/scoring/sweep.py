@@ -15,22 +15,15 @@ from numpy.typing import NDArray
 from tcs.errors import TcsError
 from tcs.files.blocks import BlockFolder
 from tcs.files.mapped import chunks, large_zeros, release
-from tcs.files.memory import CODE, COMPILING, check_room
-from tcs.kernel.analytic.solver import is_outside
-from tcs.kernel.cache import is_compiled
 from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.sweep import gripper_contacts
 from tcs.model.scene import LoweredScene
-from tcs.placement.scoring.approaches import (
-    ENTRY,
-    check_closed_form,
-    score_with_approach,
-    warm_up_approaches,
-)
+from tcs.placement.scoring.approaches import score_with_approach
 from tcs.placement.scoring.blocks import BLOCK, Block, Kept
 from tcs.placement.scoring.engines import Part, ScoringEngine, Threads, Work
 from tcs.placement.scoring.engines.work import JOINTS
+from tcs.placement.scoring.kernel_start import KernelStart, ik_of
 from tcs.placement.scoring.shared_blocks import Manifest, Shared, joined, with_goals
 from tcs.placement.tables import ScoreTable
 
@@ -39,13 +32,6 @@ if TYPE_CHECKING:
 
 READERS = 2
 """Threads that read kept blocks."""
-
-ANALYTIC, NUMERIC = "analytic", "numeric"
-"""Solution of the inverse kinematics: in closed form, or by Newton's method from many starts."""
-_ENTRIES = {ANALYTIC: "analytic.pairs.score_pair", NUMERIC: "numeric.pairs.score_pair"}
-"""Pair scorers, compiled last but for the sweep: package, module and function."""
-_OF_FEWER = {5: "five_joints.pairs.score_turned", 6: "six_joints.pairs.score_pair"}
-"""The pair scorers of arms of fewer than seven joints, by the number of joints."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +95,7 @@ def sweep(
     if jobs < 1:
         raise TcsError(f"jobs is {jobs}; must be 1 or more threads.")
     problem = build_problem(lowered.arrays, lowered.grid, measure)
-    compile_seconds = warm_up(problem, on_compile, approaches)
+    start = KernelStart(lambda: [problem], on_compile, approaches)
     size, goals = _size(problem), problem.goal_p.shape[1]
     begun = time.perf_counter()
     reason: NDArray[np.uint8] = large_zeros((size, goals), np.uint8)
@@ -117,15 +103,18 @@ def sweep(
     dexterity: NDArray[np.float32] = large_zeros((size, goals), np.float32)
     joints = {}
     done = 0
-    work = Work(problem, gripper_contacts(problem), excluded)
 
-    def part_of(some_goals: Sequence[int]) -> Work:
-        of_goals = build_problem(with_goals(lowered, some_goals).arrays, lowered.grid, measure)
+    def work_of(some_goals: Sequence[int] | None) -> Work:
+        start.ensure()
+        of_goals = problem
+        if some_goals is not None:
+            arrays = with_goals(lowered, some_goals).arrays
+            of_goals = build_problem(arrays, lowered.grid, measure)
         return Work(of_goals, gripper_contacts(of_goals), excluded)
 
     with (
         _opened(blocks, problem, lambda: Manifest.of(lowered, measure, excluded)) as found,
-        closing(_scored(work, engine or Threads(jobs), found, part_of)) as parts,
+        closing(_scored(size, engine or Threads(jobs), found, work_of)) as parts,
     ):
         for part, block in parts:
             rows = slice(part.start, part.stop)
@@ -140,6 +129,8 @@ def sweep(
     winning = np.concatenate(
         [np.empty((0, JOINTS), np.float32), *(joints[part] for part in sorted(joints))]
     )
+    if approaches is not None:
+        start.ensure()
     approach_begun = time.perf_counter()
     if approaches is not None:
         winning = score_with_approach(
@@ -162,41 +153,11 @@ def sweep(
     )
     return Sweep(
         divided,
-        compile_seconds,
-        scoring_seconds=done_at - begun,
+        start.seconds,
+        scoring_seconds=done_at - begun - start.seconds,
         ik=ik_of(problem),
         approach_seconds=done_at - approach_begun,
     )
-
-
-def ik_of(problem: Problem) -> str:
-    """Return the inverse kinematics of the problem's arm: ANALYTIC or NUMERIC."""
-    return NUMERIC if problem.joints == 7 and is_outside(problem.arm) else ANALYTIC
-
-
-def warm_up(
-    problem: Problem,
-    on_compile: Callable[[], None] | None = None,
-    approaches: ApproachLines | None = None,
-) -> float:
-    """Compile the kernel or load its machine code; return the time this took [s].
-
-    Raises:
-        ArmClassError: If there are approaches, and the arm has no closed form.
-        MemoryError: If the address space is limited, and too little is left.
-    """
-    entries = [_OF_FEWER.get(problem.joints, _ENTRIES[ik_of(problem)])]
-    if approaches is not None:
-        check_closed_form(problem)
-        entries.append(ENTRY)
-    is_kept = all(map(is_compiled, entries))
-    if on_compile is not None and not is_kept:
-        on_compile()
-    check_room(CODE if is_kept else COMPILING)
-    begun = time.perf_counter()
-    Work(problem, gripper_contacts(problem)).warm_up()
-    seconds = time.perf_counter() - begun
-    return seconds + (0.0 if approaches is None else warm_up_approaches(problem, approaches))
 
 
 def _size(problem: Problem) -> int:
@@ -232,23 +193,24 @@ def _opened(
 
 
 def _scored(
-    work: Work,
+    size: int,
     engine: ScoringEngine,
     found_blocks: _Found | None,
-    part_of: Callable[[Sequence[int]], Work],
+    work_of: Callable[[Sequence[int] | None], Work],
 ) -> Generator[tuple[Part, Block], None, None]:
     """Yield the scores of all parts of the grid, kept ones first, and keep the new ones.
 
     Args:
-        work: The grid with all goals.
+        size: Number of configurations.
         engine: Who scores.
         found_blocks: Blocks that are kept; None to keep none.
-        part_of: Returns the grid with some of the goals.
+        work_of: Returns the grid with some of the goals, None for all; called if something has to
+            be scored.
     """
-    size, length = _size(work.problem), engine.length if found_blocks is None else BLOCK
+    length = engine.length if found_blocks is None else BLOCK
     parts = [Part(start, min(start + length, size)) for start in range(0, size, length)]
     if found_blocks is None:
-        yield from engine.scored(work, parts)
+        yield from engine.scored(work_of(None), parts)
         return
     kept, shared = found_blocks
     missing = []
@@ -263,11 +225,13 @@ def _scored(
             yield part, block
     if shared is not None:
         partly = [part for part in missing if shared.kept.has(part.start)]
-        for part, block in _completed(shared, engine, partly, part_of):
+        for part, block in _completed(shared, engine, partly, work_of):
             kept.save(part.start, block)
             missing.remove(part)
             yield part, block
-    for part, block in engine.scored(work, missing):
+    if not missing:
+        return
+    for part, block in engine.scored(work_of(None), missing):
         kept.save(part.start, block)
         yield part, block
 
@@ -276,7 +240,7 @@ def _completed(
     shared: Shared,
     engine: ScoringEngine,
     parts: Sequence[Part],
-    part_of: Callable[[Sequence[int]], Work],
+    work_of: Callable[[Sequence[int] | None], Work],
 ) -> Generator[tuple[Part, Block], None, None]:
     """Yield the scores of parts of which those of some goals are kept, but not of damaged ones."""
     if not shared.missing:
@@ -284,7 +248,7 @@ def _completed(
             if (block := shared.load(*part)) is not None:
                 yield part, block
         return
-    for part, others in engine.scored(part_of(shared.missing), parts):
+    for part, others in engine.scored(work_of(shared.missing), parts):
         if (block := shared.load(*part)) is not None:
             yield part, joined(block, others, shared.mine)
 

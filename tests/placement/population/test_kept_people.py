@@ -12,6 +12,7 @@ from tcs.files.blocks import FORMAT, BlockFolder
 from tcs.files.compression import compress
 from tcs.model.people import Bodies, draw_bodies
 from tcs.placement.population import outcomes, population
+from tcs.placement.scoring import kernel_start
 from tests.environments import CORNER, write_environment
 from tests.killed import killed_at_block
 
@@ -84,6 +85,19 @@ def test_people_of_finished_blocks_are_not_evaluated_again(errors, run, plain, t
     assert run(errors=errors)[1] == []
     assert run(errors=not errors)[1] == everybody
     assert run(errors=errors, restart=True)[1] == everybody
+
+
+def test_only_a_missing_block_starts_the_kernel(run, plain, tmp_path, monkeypatch):
+    run()
+
+    def start(*_arguments):
+        raise MemoryError("the kernel is started")
+
+    monkeypatch.setattr(kernel_start, "warm_up", start)
+    np.testing.assert_array_equal(run()[0], plain[False])
+    files(tmp_path)[0].unlink()
+    with pytest.raises(MemoryError, match="is started"):
+        run()
 
 
 def test_a_killed_run_continues_with_the_same_answers(file, run, plain, tmp_path):

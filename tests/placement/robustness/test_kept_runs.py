@@ -16,6 +16,7 @@ from tcs.model.scene import ErrorDistribution
 from tcs.placement.robustness import evaluate, kept_runs, robustify
 from tcs.placement.robustness import trials as module
 from tcs.placement.robustness.perturbed_scenes import PerturbedScenes
+from tcs.placement.scoring import kernel_start
 from tcs.stored import check_file
 from tests.killed import killed_at_block
 
@@ -80,6 +81,24 @@ def test_finished_blocks_are_not_evaluated_again(work, run, bed_trials, chair_fi
     (manifest,) = (tmp_path / "blocks").rglob(MANIFEST)
     assert check_file(manifest).kind == "manifest of blocks"
     assert {check_file(path).kind for path in files(tmp_path)} == {"block"}
+
+
+def from_file(_bed_trials, chair_file, **options):
+    return evaluate(chair_file, samples=60, **options).reached
+
+
+@pytest.mark.parametrize("work", [from_file, estimated])
+def test_only_a_missing_block_starts_the_kernel(work, run, tmp_path, monkeypatch):
+    first, _ = run(work)
+
+    def start(*_arguments):
+        raise MemoryError("the kernel is started")
+
+    monkeypatch.setattr(kernel_start, "warm_up", start)
+    np.testing.assert_array_equal(run(work)[0], first)
+    files(tmp_path)[0].unlink()
+    with pytest.raises(MemoryError, match="is started"):
+        run(work)
 
 
 @WORK

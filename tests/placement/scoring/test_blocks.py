@@ -17,6 +17,7 @@ from tcs.placement.scoring.sweep import sweep
 
 # The package has a function of the module's name.
 SWEEP = importlib.import_module("tcs.placement.scoring.sweep")
+KERNEL_START = importlib.import_module("tcs.placement.scoring.kernel_start")
 BLOCK = 20
 
 
@@ -76,6 +77,20 @@ def test_finished_blocks_are_not_scored_again(run, plain, small_job, tmp_path):
     assert_same(table, plain)
     assert scored == 0
     assert run(restart=True)[1] == len(files(tmp_path))
+
+
+def test_only_a_missing_block_starts_the_kernel(run, plain, tmp_path, monkeypatch):
+    run()
+
+    def start(*_arguments):
+        raise MemoryError("the kernel is started")
+
+    monkeypatch.setattr(KERNEL_START, "warm_up", start)
+    monkeypatch.setattr(SWEEP, "gripper_contacts", start)
+    assert_same(run()[0], plain)
+    files(tmp_path)[0].unlink()
+    with pytest.raises(MemoryError, match="is started"):
+        run()
 
 
 def test_scores_beyond_the_memory_are_the_same(run, plain, monkeypatch):

@@ -1,0 +1,84 @@
+"""The start of the kernel: its machine code, compiled or loaded when scores are first needed."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from tcs.files.memory import CODE, COMPILING, check_room
+from tcs.kernel.analytic.solver import is_outside
+from tcs.kernel.cache import is_compiled
+from tcs.kernel.problem import Problem
+from tcs.kernel.sweep import gripper_contacts
+from tcs.placement.scoring.approaches import ENTRY, check_closed_form, warm_up_approaches
+from tcs.placement.scoring.engines import Work
+
+if TYPE_CHECKING:
+    from tcs.kernel.approach.sweep import ApproachLines
+
+ANALYTIC, NUMERIC = "analytic", "numeric"
+"""Solution of the inverse kinematics: in closed form, or by Newton's method from many starts."""
+_ENTRIES = {ANALYTIC: "analytic.pairs.score_pair", NUMERIC: "numeric.pairs.score_pair"}
+"""Pair scorers, compiled last but for the sweep: package, module and function."""
+_OF_FEWER = {5: "five_joints.pairs.score_turned", 6: "six_joints.pairs.score_pair"}
+"""The pair scorers of arms of fewer than seven joints, by the number of joints."""
+
+
+@dataclass(eq=False, slots=True)
+class KernelStart:
+    """The start of the kernel for some problems, which a run that takes all from blocks saves."""
+
+    problems: Callable[[], Iterable[Problem]]
+    """Returns problems whose scoring needs all the machine code."""
+    on_compile: Callable[[], None] | None = None
+    """Called first if the kernel has to be compiled."""
+    approaches: ApproachLines | None = None
+    """The approaches that will be scored."""
+    seconds: float = 0.0
+    """Time that this has taken [s]."""
+    is_done: bool = field(default=False, init=False)
+
+    def ensure(self) -> None:
+        """Compile the kernel or load its machine code, unless that was done.
+
+        Raises:
+            ArmClassError: If there are approaches, and the arm has no closed form.
+            MemoryError: If the address space is limited, and too little is left.
+        """
+        if not self.is_done:
+            self.seconds = sum(
+                warm_up(problem, self.on_compile, self.approaches) for problem in self.problems()
+            )
+            self.is_done = True
+
+
+def ik_of(problem: Problem) -> str:
+    """Return the inverse kinematics of the problem's arm: ANALYTIC or NUMERIC."""
+    return NUMERIC if problem.joints == 7 and is_outside(problem.arm) else ANALYTIC
+
+
+def warm_up(
+    problem: Problem,
+    on_compile: Callable[[], None] | None = None,
+    approaches: ApproachLines | None = None,
+) -> float:
+    """Compile the kernel or load its machine code; return the time this took [s].
+
+    Raises:
+        ArmClassError: If there are approaches, and the arm has no closed form.
+        MemoryError: If the address space is limited, and too little is left.
+    """
+    entries = [_OF_FEWER.get(problem.joints, _ENTRIES[ik_of(problem)])]
+    if approaches is not None:
+        check_closed_form(problem)
+        entries.append(ENTRY)
+    is_kept = all(map(is_compiled, entries))
+    if on_compile is not None and not is_kept:
+        on_compile()
+    check_room(CODE if is_kept else COMPILING)
+    begun = time.perf_counter()
+    Work(problem, gripper_contacts(problem)).warm_up()
+    seconds = time.perf_counter() - begun
+    return seconds + (0.0 if approaches is None else warm_up_approaches(problem, approaches))
