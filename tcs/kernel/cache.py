@@ -23,6 +23,7 @@ from numba.core import types
 from numba.core.registry import CPUDispatcher
 
 from tcs.errors import OutputError
+from tcs.files.memory import CODE, COMPILING, check_room
 from tcs.files.paths import cache_folder
 from tcs.kernel.inner_code import InnerCache, InnerCompiler, inner_key
 from tcs.kernel.machine_code import CodeCache, private_folder, warn_once
@@ -121,7 +122,14 @@ class _Entry(CPUDispatcher):
         return types.Dispatcher(self.inner)
 
     def compile(self, sig: Any) -> Any:
-        """Compile for a signature, with everything that the function calls."""
+        """Compile for a signature, with everything that the function calls, or load that.
+
+        Raises:
+            MemoryError: If the address space is limited, and too little is left: LLVM would end the
+                process.
+        """
+        kept = isinstance(self._cache, CodeCache) and self._cache.has(sig, self.targetctx)
+        check_room(CODE if kept else COMPILING)
         before = gc.get_threshold()
         gc.set_threshold(*_COLLECTIONS)
         try:

@@ -190,3 +190,8 @@ class CodeCache(FunctionCache):
             re.sub(r"[^\w.-]", "", name) + self._suffix,
             self._impl.locator.get_source_stamp(),
         )
+
+    def has(self, signature: Any, target_context: Any) -> bool:
+        """Return whether there is a file for a signature, be it damaged."""
+        key = self._index_key(signature, target_context.codegen())
+        return self._cache_file.path(key).exists()

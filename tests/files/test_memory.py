@@ -1,5 +1,6 @@
 """A limited address space: refused before code that would wait for ever or end the process."""
 
+import os
 import resource
 import subprocess
 import sys
@@ -56,6 +57,23 @@ def test_compiling_needs_more_room_than_loading_machine_code(is_kept, needed, mo
     with pytest.raises(MemoryError):
         kernel_start.warm_up(SimpleNamespace(joints=6))
     assert asked == [needed]
+
+
+def test_a_command_that_would_compile_in_too_little_room_ends_in_one_line(tmp_path):
+    # Enough for Drake and numba, but LLVM ends the process where it finds no room for its code.
+    megabytes = memory.START // MEGABYTE + 670
+    done = subprocess.run(
+        [sys.executable, "-m", "tcs", "capability", "from-ik", "--out", str(tmp_path / "out.icm")],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=200,
+        env={**os.environ, "TCS_CACHE_DIR": str(tmp_path / "cache")},
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (megabytes * MEGABYTE,) * 2),
+    )
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1].startswith("tcs: the memory does not suffice")
+    assert not (tmp_path / "out.icm").exists()
 
 
 # From too little for NumPy and the commands, and for the BLAS of SciPy, which would ask for ever,

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 from numba.core.codegen import CPUCodeLibrary, JITCodeLibrary
 
-from tcs.kernel import machine_code
+from tcs.files import memory
+from tcs.kernel import cache, machine_code
 from tcs.kernel.cache import inner, jit, jit_folder
 
 ROOT = Path(__file__).parents[2]
@@ -49,6 +50,21 @@ def hits(function, expected):
     compiled = jit(function)
     assert compiled(2.0) == expected
     return sum(compiled.stats.cache_hits.values())
+
+
+def test_room_is_checked_before_code_is_compiled_or_loaded(monkeypatch):
+    asked = []
+    monkeypatch.setattr(cache, "check_room", asked.append)
+    hits(scaled, 7.0)
+    assert hits(scaled, 7.0) == 1
+    assert asked == [memory.COMPILING, memory.CODE]
+
+    def refuse(_needed):
+        raise MemoryError
+
+    monkeypatch.setattr(cache, "check_room", refuse)
+    with pytest.raises(MemoryError):
+        hits(shifted, -5.0)
 
 
 def summed(x):
