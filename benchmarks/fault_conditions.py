@@ -1,12 +1,12 @@
 """Run commands on machines that lack something, and count what goes wrong.
 
-Usage: python benchmarks/fault_conditions.py [--flips 20] [--only NAME] [--seed 0]
+Usage: python benchmarks/fault_conditions.py [--flips 20] [--only NAME ...] [--seed 0]
 
 Each command that writes a file runs with a full disk, too little memory, no home and a folder that
 cannot be written; `tcs score` also beside another process with the same cold cache, with a Dask
-worker that is killed, and with a bit of its machine code flipped. `--only` names one of these
-conditions. Afterwards the same command must end its work. Every count of a fault should be 0; the
-exit code is 1 if one is not.
+worker that is killed, and with a bit of its machine code flipped. `--only` names some of these
+conditions: disk, memory, home, folder, cold, dask, flips. Afterwards the same command must end its
+work. Every count of a fault should be 0; the exit code is 1 if one is not.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import sys
 import tempfile
 import threading
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 
@@ -33,7 +33,7 @@ from fault_commands import (
     scoring_commands,
     small_scores,
 )
-from table import header, parser, record, row, save
+from table import cell, header, parser, row, save
 
 from tcs.kernel.cache import jit_folder
 from tcs.kernel.machine_code import private_folder
@@ -56,26 +56,41 @@ LIMIT_FILE = (4_000, 10_000, 30_000)
 """Largest file that can be written [bytes]: a disk that is full after so many. The semaphores of
 joblib, which are files too, need some dozens."""
 FAULTS = COLUMNS[3:]
+CONDITIONS = {
+    "disk": "files cannot grow (full disk)",
+    "memory": "too little memory",
+    "home": "no home",
+    "folder": "folder that cannot be written",
+    "cold": "two processes, one cold cache",
+    "dask": "Dask worker killed",
+    "flips": "a bit of the machine code flipped",
+}
+"""The conditions by the names of `--only`, and how the table calls them."""
 
 
 def main() -> int:
     """Run every command under every condition and print the counts."""
     command_line = parser(__doc__)
     command_line.add_argument("--flips", type=int, default=20)
-    command_line.add_argument("--only", choices=("commands", "cold", "dask", "flips"))
+    command_line.add_argument("--only", nargs="*", choices=CONDITIONS, default=list(CONDITIONS))
     command_line.add_argument("--seed", type=int, default=0)
     options = command_line.parse_args()
     header()
+    faults = 0
     with tempfile.TemporaryDirectory() as above:
         folder = Path(above)
         environment, scores = small_scores(folder)
-        found = conditions(folder / "trials", environment, scores, options)
-    for name, counts in found.items():
-        row(name, ", ".join(f"{column} {counts[column]}" for column in COLUMNS))
-    rows = [[name, *(str(counts[c]) for c in COLUMNS)] for name, counts in found.items()]
-    record("conditions", ["", *COLUMNS], rows)
-    save(options)
-    return int(any(counts[fault] for counts in found.values() for fault in FAULTS))
+        (folder / "trials").mkdir()
+        for name in options.only:
+            found = counted(name, folder / "trials", environment, scores, options)
+            title = CONDITIONS[name]
+            row(title, ", ".join(f"{column} {found[column]}" for column in COLUMNS))
+            for column in COLUMNS:
+                cell("conditions", title, column, str(found[column]))
+            faults += sum(found[fault] for fault in FAULTS)
+            # An interrupted run keeps the conditions that it has finished.
+            save(options, keep=True)
+    return int(faults > 0)
 
 
 def limited(kind: int, most: int) -> Callable[[], None]:
@@ -83,47 +98,57 @@ def limited(kind: int, most: int) -> Callable[[], None]:
     return lambda: resource.setrlimit(kind, (most, most))
 
 
-def conditions(
-    folder: Path, environment: Path, scores: Path, options: argparse.Namespace
-) -> dict[str, Counter[str]]:
-    """Return the counts of every condition, by its name.
+def counted(
+    name: str, folder: Path, environment: Path, scores: Path, options: argparse.Namespace
+) -> Counter[str]:
+    """Return the counts of a condition.
 
     Args:
-        folder: Folder to make for the trials.
+        name: One of `CONDITIONS`.
+        folder: Folder for the trials.
         environment: A small environment.
         scores: Its scores, made without any condition.
-        options: Which conditions, and how many flipped bits.
+        options: How many flipped bits, and the seed.
     """
-    folder.mkdir()
     plain = {**os.environ, "PYTHONPATH": str(CHECKOUT)}
     commands = scoring_commands(environment, scores)
-    found: dict[str, Counter[str]] = {}
-
-    def count(name: str, command: Command, variables: Mapping[str, str], **limits: object) -> None:
-        counts = found.setdefault(name, Counter(dict.fromkeys(COLUMNS, 0)))
+    if name == "cold":
+        return cold_cache(folder / "cold", commands[0], plain, scores)
+    if name == "dask":
+        return killed_worker(folder / "dask", commands[0], plain, scores)
+    counts: Counter[str] = Counter(dict.fromkeys(COLUMNS, 0))
+    for command, variables, limits in trials_of(name, commands, plain, folder, options):
         with tempfile.TemporaryDirectory(dir=folder) as made:
-            ended = tried(name, command, Path(made), dict(variables), plain, scores, **limits)
-            counts.update(ended)
+            counts.update(
+                tried(CONDITIONS[name], command, Path(made), variables, plain, scores, **limits)
+            )
+    return counts
 
-    for command in commands if options.only in (None, "commands") else ():
-        for most in LIMIT_FILE:
-            limit = limited(resource.RLIMIT_FSIZE, most)
-            count("files cannot grow (full disk)", command, plain, preexec_fn=limit)
-        for most in LIMIT_MEMORY:
-            limit = limited(resource.RLIMIT_AS, most * MEGABYTE)
-            count("too little memory", command, plain, preexec_fn=limit)
-        count("no home", command, without_home(plain))
-        count("folder that cannot be written", command.writing_to(Path("/proc")), plain)
-    if options.only in (None, "cold"):
-        made = cold_cache(folder / "cold", commands[0], plain, scores)
-        found["two processes, one cold cache"] = made
-    if options.only in (None, "dask"):
-        found["Dask worker killed"] = killed_worker(folder / "dask", commands[0], plain, scores)
-    if options.only in (None, "flips"):
+
+def trials_of(
+    name: str,
+    commands: Sequence[Command],
+    plain: dict[str, str],
+    folder: Path,
+    options: argparse.Namespace,
+) -> Iterator[tuple[Command, dict[str, str], dict[str, Callable[[], None]]]]:
+    """Yield command, variables and limits of each trial of a condition."""
+    if name == "flips":
         for cache in islice(flipped_bits(folder / "flips", options.seed), options.flips):
-            variables = {**plain, "TCS_CACHE_DIR": str(cache)}
-            count("a bit of the machine code flipped", commands[0], variables)
-    return found
+            yield commands[0], {**plain, "TCS_CACHE_DIR": str(cache)}, {}
+        return
+    for command in commands:
+        if name == "disk":
+            for most in LIMIT_FILE:
+                yield command, plain, {"preexec_fn": limited(resource.RLIMIT_FSIZE, most)}
+        elif name == "memory":
+            for most in LIMIT_MEMORY:
+                limit = limited(resource.RLIMIT_AS, most * MEGABYTE)
+                yield command, plain, {"preexec_fn": limit}
+        elif name == "home":
+            yield command, without_home(plain), {}
+        else:
+            yield command.writing_to(Path("/proc")), plain, {}
 
 
 def flipped_bits(folder: Path, seed: int) -> Iterator[Path]:

@@ -112,24 +112,24 @@ def work(name: str, folder: Path, seed: int, score_every: int) -> None:
     for line in sys.stdin:
         number = json.loads(line)
         path.write_bytes(mutant(file_type, original, seed, number))
-        begun = time.perf_counter()
+        begun = time.process_time()
         outcome, text = judged(file_type, path, number, score=number % score_every == 0)
-        answer = {"outcome": outcome, "text": text, "seconds": time.perf_counter() - begun}
+        answer = {"outcome": outcome, "text": text, "seconds": time.process_time() - begun}
         print(json.dumps(answer), file=answers, flush=True)
 
 
-def run(
-    names: list[str], numbers: range, seed: int, score_every: int, folder: Path
-) -> Iterator[tuple[str, int, dict[str, Any]]]:
-    """Yield type, number and answer of every mutant."""
-    for name in names:
-        words = ["--only", name, "--seed", str(seed), "--score-every", str(score_every)]
-        worker = Worker(Path(__file__), words, folder, SECONDS)
-        try:
-            for number in numbers:
-                yield name, number, worker.judge(number)
-        finally:
-            worker.close()
+def answers_of(
+    name: str, numbers: range, options: argparse.Namespace, folder: Path
+) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Yield number and answer of each mutant of a type."""
+    seed, score_every = str(options.seed), str(options.score_every)
+    words = ["--only", name, "--seed", seed, "--score-every", score_every]
+    worker = Worker(Path(__file__), words, folder, SECONDS)
+    try:
+        for number in numbers:
+            yield number, worker.judge(number)
+    finally:
+        worker.close()
 
 
 def main() -> None:
@@ -152,32 +152,36 @@ def main() -> None:
         return
     table.header()
     names = options.only or [one.name for one in ALL_TYPES]
-    counts: dict[str, Counter[str]] = {name: Counter() for name in names}
-    slowest = dict.fromkeys(names, 0.0)
+    numbers = range(options.first, options.first + options.mutants)
+    types = [one for one in ALL_TYPES if one.name in names]
     with tempfile.TemporaryDirectory(prefix="tcs-fuzz-") as folder:
-        prepare(Path(folder))
-        numbers = range(options.first, options.first + options.mutants)
-        for name, number, answer in run(
-            names, numbers, options.seed, options.score_every, Path(folder)
-        ):
-            outcome = answer["outcome"]
-            counts[name][outcome] += 1
-            if outcome == "scored":
-                counts[name]["pairs"] += int(answer["text"])
-            slowest[name] = max(slowest[name], answer["seconds"])
-            if outcome in DEFECTS and counts[name][outcome] <= options.show:
-                print(f"--- {outcome}: {name}, mutant {number}\n{answer['text']}", flush=True)
-            if number == numbers[-1]:
-                shown = ", ".join(f"{counts[name][o]} {o}" for o in OUTCOMES if counts[name][o])
-                pairs = f"{counts[name]['pairs']} pairs re-checked"
-                table.row(name, f"{shown}; {pairs}; slowest {slowest[name]:.1f} s")
-    for name, count in counts.items():
-        count["accepted"] += count["scored"]
-        for outcome in OUTCOMES:
-            table.cell("fuzz", name, outcome, f"{count[outcome]:,}")
-        table.cell("fuzz", name, "pairs re-checked", f"{count['pairs']:,}")
-        table.cell("fuzz", name, "slowest [s]", f"{slowest[name]:.1f}")
-    table.save(options, keep=True)
+        prepare(Path(folder), [one.file for one in types])
+        for name in names:
+            judge_all(name, numbers, options, Path(folder))
+            # An interrupted run keeps the types that it has finished.
+            table.save(options, keep=True)
+
+
+def judge_all(name: str, numbers: range, options: argparse.Namespace, folder: Path) -> None:
+    """Judge mutants of a type; print defects and a line of the table, and record it."""
+    count: Counter[str] = Counter()
+    slowest = (0.0, 0)
+    for number, answer in answers_of(name, numbers, options, folder):
+        outcome = answer["outcome"]
+        count[outcome] += 1
+        if outcome == "scored":
+            count["pairs"] += int(answer["text"])
+        slowest = max(slowest, (answer["seconds"], number))
+        if outcome in DEFECTS and count[outcome] <= options.show:
+            print(f"--- {outcome}: {name}, mutant {number}\n{answer['text']}", flush=True)
+    shown = ", ".join(f"{count[outcome]} {outcome}" for outcome in OUTCOMES if count[outcome])
+    slow = f"slowest {slowest[0]:.1f} s (mutant {slowest[1]})"
+    table.row(name, f"{shown}; {count['pairs']} pairs re-checked; {slow}")
+    count["accepted"] += count["scored"]
+    for outcome in OUTCOMES:
+        table.cell("fuzz", name, outcome, f"{count[outcome]:,}")
+    table.cell("fuzz", name, "pairs re-checked", f"{count['pairs']:,}")
+    table.cell("fuzz", name, "slowest [s]", f"{slowest[0]:.1f}")
 
 
 if __name__ == "__main__":

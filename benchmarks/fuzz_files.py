@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -128,10 +128,17 @@ class FileType:
     one in ten."""
 
 
-def prepare(folder: Path) -> None:
-    """Write a valid example of every file into a folder."""
+def prepare(folder: Path, files: Collection[str]) -> None:
+    """Write valid examples into a folder: all that a person could have written, and some others.
+
+    Args:
+        folder: The folder.
+        files: Names of the files that are needed of those that `tcs` makes.
+    """
     write_texts(folder)
-    _write_results(folder)
+    for made, write in _RESULTS:
+        if not made.isdisjoint(files):
+            write(folder)
 
 
 def write_texts(folder: Path) -> None:
@@ -186,23 +193,32 @@ def _write_arplace(folder: Path) -> None:
     save_probability_map(folder / "map.apm", query(model).map)
 
 
-def _write_results(folder: Path) -> None:
-    """Write the files that `tcs` makes itself: scores, run, recording and maps."""
+def _write_scores(folder: Path) -> None:
+    """Write the scores of the kitchen."""
     import tcs
-    from tcs.capability import MapGrid, Reach, map_from_recording, save_map, write_csv
-    from tcs.model.robots import load_robot
-    from tcs.teleop.runs.files import save_run
-    from tcs.teleop.runs.run import Run
-    from tcs.teleop.simulated_recording import HandMotion, simulate_recording
 
     scores = tcs.score(folder / "task.yaml", folder / "kitchen.yaml", folder / "iiwa7.yaml")
     tcs.save(folder / "scores.tcs", scores)
-    reach = Reach.load("pr2", step=0.1)
+
+
+def _write_map(folder: Path) -> None:
+    """Write a recording, and the map that is made of it."""
+    from tcs.capability import MapGrid, map_from_recording, save_map, write_csv
+    from tcs.teleop.simulated_recording import HandMotion, simulate_recording
+
+    reach = default_reach()
     recording = simulate_recording(reach, HandMotion(seconds=2.0), seed=0).recording
     write_csv(folder / "recording.csv", reach.robot, recording)
     grid = MapGrid.of(0.1, 8, "all")
     save_map(folder / "map.tcm", map_from_recording(reach, grid, recording).capability)
-    _write_arplace(folder)
+
+
+def _write_run(folder: Path) -> None:
+    """Write a run of teleoperation, of random numbers."""
+    from tcs.model.robots import load_robot
+    from tcs.teleop.runs.files import save_run
+    from tcs.teleop.runs.run import Run
+
     robot = load_robot("iiwa7")
     rng, n = np.random.default_rng(0), 20
     quaternion = rng.standard_normal((n, 4))
@@ -225,6 +241,15 @@ def _write_results(folder: Path) -> None:
         metadata={"robot": "iiwa7", "seed": 0},
     )
     save_run(folder / "run.csv", run)
+
+
+_RESULTS: tuple[tuple[frozenset[str], Callable[[Path], None]], ...] = (
+    (frozenset({"scores.tcs"}), _write_scores),
+    (frozenset({"recording.csv", "map.tcm"}), _write_map),
+    (frozenset({"model.arp", "map.apm"}), _write_arplace),
+    (frozenset({"run.csv"}), _write_run),
+)
+"""Files that `tcs` makes, and what makes them."""
 
 
 def three(folder: Path) -> Scored:

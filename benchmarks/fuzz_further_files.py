@@ -6,6 +6,7 @@ import json
 import shutil
 import struct
 import tempfile
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,10 @@ property float z
 end_header
 """
 
+_OF_MOTIONS = {"scores.tcs.motions", "plan.json", "kept.block", "manifest.json"}
+"""Files that are made together, of scores."""
+_OF_SCORES = {*_OF_MOTIONS, "constraints.yaml"}
+"""Files that are used with scores."""
 BLOCK = 32
 """Configurations of the kitchen's grid, in both observed states."""
 
@@ -91,14 +96,21 @@ def write_bag(path: Path, names: list[str], rows: np.ndarray) -> None:
             writer.write(connection, i * 20_000_000, store.serialize_ros1(state, name))
 
 
-def prepare(folder: Path) -> None:
-    """Write a valid example of every file into a folder."""
-    prepare_files(folder)
+def prepare(folder: Path, files: Collection[str]) -> None:
+    """Write valid examples into a folder, as `fuzz_files.prepare`, of files of all types."""
+    needed = set(files)
+    if not _OF_SCORES.isdisjoint(files):
+        needed.add("scores.tcs")
+    if "arm.bag" in files:
+        needed.add("recording.csv")
+    prepare_files(folder, needed)
     write_texts(folder)
-    names, *rows = (folder / "recording.csv").read_text(encoding="utf-8").splitlines()
-    states = np.array([row.split(",") for row in rows[:20]], dtype=np.float64)
-    write_bag(folder / "arm.bag", names.split(","), states)
-    _write_motions(folder)
+    if "arm.bag" in files:
+        names, *rows = (folder / "recording.csv").read_text(encoding="utf-8").splitlines()
+        states = np.array([row.split(",") for row in rows[:20]], dtype=np.float64)
+        write_bag(folder / "arm.bag", names.split(","), states)
+    if not _OF_MOTIONS.isdisjoint(files):
+        _write_motions(folder)
 
 
 def _write_motions(folder: Path) -> None:

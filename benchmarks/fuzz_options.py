@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 import table
-from fuzz_files import prepare
+from fuzz_files import FILE_TYPES, prepare
 from fuzz_further_files import write_bag
 from worker import Worker
 
@@ -442,7 +442,7 @@ def main() -> int:
     counts: dict[str, Counter[str]] = {}
     slowest: dict[str, float] = {}
     with tempfile.TemporaryDirectory(prefix="tcs-fuzz-") as folder:
-        prepare(Path(folder))
+        prepare(Path(folder), [one.file for one in FILE_TYPES])
         make_map(Path(folder))
         make_bag(Path(folder))
         make_study(Path(folder))

@@ -44,24 +44,25 @@ class Worker:
         self._folder: tempfile.TemporaryDirectory[str] | None = None
 
     def judge(self, question: object) -> dict[str, Any]:
-        """Return outcome, text and seconds of an input, which is sent as JSON."""
+        """Return outcome, text and processor time [s] of an input, which is sent as JSON."""
         if self._process is None:
             self._start()
         assert self._process is not None
         assert self._process.stdin is not None
-        begun = time.perf_counter()
+        begun = processor_seconds(self._process.pid)
         self._process.stdin.write(json.dumps(question).encode() + b"\n")
         self._process.stdin.flush()
         line = self._line(self._seconds)
         if line:
             answer: dict[str, Any] = json.loads(line)
             return answer
+        seconds = processor_seconds(self._process.pid) - begun
         limits = f"{self._seconds:g} s of processor time or {WAITING * self._seconds:g} s"
         outcome, text = "hang", f"no answer within {limits}"
         if line is not None:
             outcome, text = "abort", f"the process ended with code {self._process.wait()}"
         self.close()
-        return {"outcome": outcome, "text": text, "seconds": time.perf_counter() - begun}
+        return {"outcome": outcome, "text": text, "seconds": seconds}
 
     @property
     def runs(self) -> bool:
