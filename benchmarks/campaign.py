@@ -35,7 +35,7 @@ from tcs.model.robots import load_robot, robot_names
 from tcs.model.scene import PeopleInScene, load_environment
 from tcs.model.tasks import load_task
 from tcs.placement.scoring.catalogue import task_environment_pairs
-from tcs.placement.scoring.dry_run import estimate_from, scored_slice
+from tcs.placement.scoring.dry_run import ScoredSlice, estimate_from, scored_slice
 from tcs.placement.scoring.engines import Part, Work
 from tcs.placement.scoring.job import load_job
 from tcs.placement.scoring.kernel_start import warm_up
@@ -120,7 +120,7 @@ def estimates(group: Sequence[Job], people: People) -> list[dict[str, Any]]:
     starts = np.linspace(0, max(0, size - SLICE), SLICES * len(group)).astype(int)
     of_bodies = starts.reshape(SLICES, -1).T
     refused = refusals(group[0].task, group[0].environment, people)
-    slices = []
+    slices: list[ScoredSlice] = []
     for scale, begins, refusal in zip(people.scales, of_bodies.tolist(), refused, strict=True):
         if refusal is not None:
             continue

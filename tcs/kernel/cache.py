@@ -128,7 +128,8 @@ class _Entry(CPUDispatcher):
             MemoryError: If the address space is limited, and too little is left: LLVM would end the
                 process.
         """
-        kept = isinstance(self._cache, CodeCache) and self._cache.has(sig, self.targetctx)
+        code: object = self._cache  # type: ignore[attr-defined]
+        kept = isinstance(code, CodeCache) and code.has(sig, self.targetctx)
         check_room(CODE if kept else COMPILING)
         before = gc.get_threshold()
         gc.set_threshold(*_COLLECTIONS)

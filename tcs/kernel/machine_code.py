@@ -185,13 +185,14 @@ class CodeCache(FunctionCache):
         super().__init__(function)
         name = f"{function.__module__}.{function.__qualname__}-{function.__code__.co_firstlineno}"
         self._cache_path = str(folder)
-        self._cache_file = CodeFiles(
+        self._files = CodeFiles(
             folder,
             re.sub(r"[^\w.-]", "", name) + self._suffix,
             self._impl.locator.get_source_stamp(),
         )
+        self._cache_file = self._files
 
     def has(self, signature: Any, target_context: Any) -> bool:
         """Return whether there is a file for a signature, be it damaged."""
         key = self._index_key(signature, target_context.codegen())
-        return self._cache_file.path(key).exists()
+        return self._files.path(key).exists()
