@@ -16,7 +16,7 @@ ITERATIONS = 20_000
 leads to, one in a hundred takes more than a tenth of these: goals of a single posture beside the
 person's arm."""
 SHORTCUTS = 20
-"""Number of random shortcuts that are tried: three times as many make paths a hundredth shorter."""
+"""Greatest number of random shortcuts that are tried, as long as not too many are blocked."""
 WIDEST_CORNER = 0.3
 """Greatest length of an edge that a rounded corner takes up [rad, norm of the joints]."""
 LIMIT_ROUNDING = 1e-10

@@ -13,17 +13,17 @@ import numpy as np
 
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, jit
+from tcs.kernel.motion.leaves import contact_here
+from tcs.kernel.motion.near_lists import append_below, list_near
 from tcs.kernel.motion.pairs import (
     ROUNDING,
-    append_below,
     is_near,
     is_near_on_piece,
     is_of_groups,
-    list_near,
     take_posture,
 )
 from tcs.kernel.motion.planes import take_twists
-from tcs.kernel.motion.scene import LISTED, WIDE, MotionScene, MotionWorkspace
+from tcs.kernel.motion.scene import LISTED, NO_PAIR, WIDE, MotionScene, MotionWorkspace
 from tcs.kernel.views import unowned
 
 RESOLUTION = 1e-5
@@ -32,10 +32,12 @@ much more clearance than required."""
 PIECE = 0.2
 """Motion [m] of the pieces into which a curve is divided first: on longer ones most pairs may
 meet."""
+GOLDEN = 0.382
+"""Step from one of these postures to the next, as a fraction of the edge: the golden section
+spreads the first of them evenly, however many there are."""
 SPACING = 0.3
 """Bound on the motion of the arm [m] between the postures at which an edge is checked before it is
 certified: most edges that are blocked are so at one of them."""
-NO_PAIR = -1
 
 
 @inner
@@ -58,10 +60,11 @@ def _is_free_here(scene: MotionScene, work: MotionWorkspace) -> bool:
     last = work.contact[0]
     if last >= 0 and is_near(scene, work, last, False):
         return False
-    if list_near(scene, work, 0.0, 1) > 0:
-        work.contact[0] = work.pairs[0]
-        return False
-    return True
+    found = contact_here(scene, work)
+    if found == NO_PAIR:
+        return True
+    work.contact[0] = found
+    return False
 
 
 @jit
@@ -101,26 +104,32 @@ def edge_is_free(
 def edge_seems_free(
     scene: MotionScene, work: MotionWorkspace, start: FloatArray, end: FloatArray
 ) -> bool:
-    """Return whether nothing touches at postures of a straight edge [rad], from the end on.
-
-    The postures halve the edge again and again. The start is not checked.
-    """
+    """Return whether nothing touches at postures between the two ends of a straight edge [rad]."""
     moved = 0.0
     for k in range(7):
         moved += abs(end[k] - start[k]) * scene.reach[k]
-    parts = 1
-    while parts * SPACING < moved:
-        parts *= 2
-    first, stride = parts, parts
-    while first > 0:
-        for n in range(first, parts + 1, stride):
+    parts = max(int(np.ceil(moved / SPACING)), 1)
+    stride = max(int(GOLDEN * parts + 0.5), 1)
+    while not _are_coprime(stride, parts):
+        stride += 1
+    n = parts // 2
+    for _ in range(parts):
+        if n > 0:
             for k in range(7):
                 work.q[k] = start[k] + (end[k] - start[k]) * (n / parts)
             if not _is_free_here(scene, work):
                 work.hits[work.contact[0]] += 1
                 return False
-        first, stride = first // 2, first
+        n = (n + stride) % parts
     return True
+
+
+@inner
+def _are_coprime(a: int, b: int) -> bool:
+    """Return whether two positive integers have no common divisor but 1."""
+    while b > 0:
+        a, b = b, a % b
+    return a == 1
 
 
 @inner

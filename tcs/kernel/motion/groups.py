@@ -16,7 +16,7 @@ import numpy as np
 
 from tcs.kernel.arrays import BOX, CAPSULE, BoolArray, FloatArray, IntArray
 from tcs.kernel.collide import BOUND, CENTRE, COLUMNS, ROTATION, SIZE, TYPE
-from tcs.kernel.motion.scene import MotionScene, pair_fields
+from tcs.kernel.motion.scene import NO_PAIR, MotionScene, pair_fields
 
 LEAST = 8
 """Number of shapes of a link up to which they get no boxes: checking each pair takes no longer."""
@@ -80,13 +80,53 @@ def grouped(scene: MotionScene, carrier: IntArray | None = None) -> MotionScene:
         int(kept[0].sum()),
     )
     bodies = (_bodies(arm, scene.body[:count]), _bodies(around, scene.body[count:]))
+    leaf, leaves, root = _leaves(arm)
+    leaf_pair = np.full((len(leaf), shapes), NO_PAIR)
+    column = np.full(len(arm.rows), len(leaf))
+    column[leaf] = np.arange(len(leaf))
+    of_leaf = (column[first] < len(leaf)) & (second >= len(arm.rows))
+    of_leaf &= second < len(arm.rows) + shapes
+    pair = np.flatnonzero(of_leaf)
+    leaf_pair[column[first[pair]], second[pair] - len(arm.rows)] = pair
     return scene._replace(
+        leaf=np.concatenate(
+            [arm.rows[leaf, CENTRE : CENTRE + 3], arm.rows[leaf, BOUND, None]], 1
+        ).T.copy(),
+        leaves=leaves,
+        leaf_shape=leaf,
+        root=root,
+        leaf_pair=leaf_pair,
         links=arm.rows,
         link_frame=arm.frame,
         fixed=around.rows,
         body=np.concatenate(bodies),
         **fields,
     )
+
+
+def _leaves(groups: Groups) -> tuple[IntArray, IntArray, IntArray]:
+    """Return the shapes in boxes that are in no other box, and which of them are in each of those.
+
+    Returns:
+        Numbers of the shapes, box by box, shape (n,); the first and one after the last of them for
+        each shape or box, equal for those without, shape (n_rows, 2); and the box that each shape
+        or box is in, itself for those in none, shape (n_rows,).
+    """
+    found: list[int] = []
+    spans, roots = np.zeros((len(groups.rows), 2), np.int64), np.arange(len(groups.rows))
+    for root in groups.roots:
+        if groups.parts[root, 0] == NONE:
+            continue
+        begin, stack = len(found), [int(root)]
+        while stack:
+            top = stack.pop()
+            roots[top] = root
+            if groups.parts[top, 0] == NONE:
+                found.append(top)
+            else:
+                stack += groups.parts[top].tolist()
+        spans[root] = begin, len(found)
+    return np.array(found, np.int64), spans, roots
 
 
 def _bodies(groups: Groups, body: IntArray) -> IntArray:

@@ -26,10 +26,6 @@ from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
 COARSE = 0.02
 """Motion [m] above which bounding spheres alone decide whether a pair may meet on a piece: the
 exact distance is seldom greater, and the piece is halved anyway."""
-FAR = 0.25
-"""Motion relative to the size of a pair of groups above which the piece is halved first."""
-GROUP = 16
-"""Number of pairs that one vector loop checks."""
 ROUNDING = 1e-9
 """Excess of the bounds [relative, and m], far above rounding errors of positions."""
 GROWN = 1.0 + ROUNDING
@@ -47,6 +43,38 @@ def place_shape(scene: MotionScene, work: MotionWorkspace, i: int) -> None:
         for k in range(frame + 1):
             work.motion[i, k] = 0.0
         return
+    root = scene.root[i]
+    if root != i and work.posture[1] == TWISTED:
+        _bound_motion_in_box(scene, work, i, root)
+    else:
+        _bound_motion(scene, work, i)
+
+
+@inner
+def _bound_motion_in_box(scene: MotionScene, work: MotionWorkspace, i: int, root: int) -> None:
+    """Fill the rows of `motion` and `rest` of shape i, or box, in box `root` around a link's.
+
+    No point of the box moves farther than its own rows say. Relative to what is fixed, shape i is
+    bounded by the twist of its link too, which says what part of the box it is; this takes a
+    fifth of the time that `_bound_motion` does.
+    """
+    if work.placed[root] != work.posture[0]:
+        work.placed[root] = work.posture[0]
+        frame = scene.link_frame[root]
+        move(work.link_R[frame], work.link_p[frame], scene.links, root, work.shapes, root)
+        _bound_motion(scene, work, root)
+    frame = scene.link_frame[i]
+    for k in range(frame + 1):
+        work.motion[i, k], work.rest[i, k] = work.motion[root, k], work.rest[root, k]
+    work.motion[i, 0] = min(
+        work.motion[root, 0], _motion_of_twist(work, i, frame) + work.rest[root, 0]
+    )
+
+
+@inner
+def _bound_motion(scene: MotionScene, work: MotionWorkspace, i: int) -> None:
+    """Fill the rows of `motion` and `rest` of shape i, placed at the current posture."""
+    frame, shapes = scene.link_frame[i], work.shapes
     # The two cap centres of a capsule; one centre for others.
     half, radius = 0.0, shapes[i, BOUND]
     if shapes[i, TYPE] == CAPSULE:
@@ -149,168 +177,13 @@ def is_near(scene: MotionScene, work: MotionWorkspace, k: int, grown: bool) -> b
 
 
 @inner
-def list_near(scene: MotionScene, work: MotionWorkspace, extra: float, most: int) -> int:
-    """List the pairs that may touch on the current piece from `work.pairs[0]` on.
-
-    Args:
-        scene: The scene.
-        work: Scratch, with the current posture.
-        extra: Added to the gap of each pair [m].
-        most: Number of pairs after which to stop.
-
-    Returns:
-        Number of pairs listed.
-    """
-    count = 0
-    for i in scene.roots:
-        place_shape(scene, work, i)
-    for i in scene.roots:
-        first, moving, last = scene.first_pair[i], scene.first_moving[i], scene.first_pair[i + 1]
-        while first < moving and count < most:
-            end = min(first + GROUP, moving)
-            apart = work.motion[i, 0] + extra
-            if _any_overlap(scene, work, i, first, end, apart):
-                for k in range(first, end):
-                    if count < most and _overlaps(scene, work, i, k, apart):
-                        count = _append_near(scene, work, k, k + 1, extra, count, most)
-            first = end
-        if count < most:
-            count = _append_near(scene, work, moving, last, extra, count, most)
-        if count == most:
-            return count
-    return count
-
-
-@inner
-def _any_overlap(
-    scene: MotionScene, work: MotionWorkspace, i: int, first: int, last: int, extra: float
-) -> bool:
-    """Return whether bounding spheres of shape i and fixed shapes are closer than their gap.
-
-    Args:
-        scene: The scene.
-        work: Scratch, with the current posture.
-        i: Shape of the arm.
-        first: First pair.
-        last: One after the last pair.
-        extra: Added to the gap of each pair [m].
-    """
-    gap, bound = scene.gap[first:last], scene.bound[first:last]
-    u, v, w = scene.centre[0, first:last], scene.centre[1, first:last], scene.centre[2, first:last]
-    shapes = work.shapes
-    x, y, z = shapes[i, CENTRE], shapes[i, CENTRE + 1], shapes[i, CENTRE + 2]
-    overlaps = 0
-    # No branch and no early end: LLVM makes this loop a vector loop.
-    for n in range(len(gap)):
-        dx, dy, dz = u[n] - x, v[n] - y, w[n] - z
-        apart = bound[n] + gap[n] + extra
-        overlaps += int(dx * dx + dy * dy + dz * dz < apart * apart)
-    return overlaps > 0
-
-
-@inner
-def _overlaps(scene: MotionScene, work: MotionWorkspace, i: int, k: int, extra: float) -> bool:
-    """Return whether pair k, of shape i and a fixed one, is as `_any_overlap` says of some."""
-    shapes, centre = work.shapes, scene.centre
-    dx, dy, dz = (
-        centre[0, k] - shapes[i, CENTRE],
-        centre[1, k] - shapes[i, CENTRE + 1],
-        centre[2, k] - shapes[i, CENTRE + 2],
-    )
-    apart = scene.bound[k] + scene.gap[k] + extra
-    return dx * dx + dy * dy + dz * dz < apart * apart
-
-
-@inner
-def _append_near(
-    scene: MotionScene,
-    work: MotionWorkspace,
-    first: int,
-    last: int,
-    extra: float,
-    count: int,
-    most: int,
-) -> int:
-    """Append pairs that may touch to `work.pairs`; return how many there are.
-
-    Args:
-        scene: The scene.
-        work: Scratch, with the current posture; the shapes of the pairs are placed.
-        first: First pair.
-        last: One after the last pair.
-        extra: Added to the gap of each pair [m].
-        count: Number of pairs listed already.
-        most: Number of pairs after which to stop.
-    """
-    for k in range(first, last):
-        moved = work.motion[scene.pair[k, 0], scene.pair[k, 2]]
-        if _may_touch_on_piece(scene, work, k, moved, extra):
-            count = append_below(scene, work, k, moved, extra, count, most)
-            if count == most:
-                break
-    return count
-
-
-@inner
 def is_of_groups(scene: MotionScene, k: int) -> bool:
     """Return whether there are pairs below pair k, so that it cannot be in contact itself."""
     return k < len(scene.below) and scene.below[k, 0] < scene.below[k, 1]
 
 
 @inner
-def append_below(
-    scene: MotionScene,
-    work: MotionWorkspace,
-    k: int,
-    moved: float,
-    extra: float,
-    count: int,
-    most: int,
-) -> int:
-    """Append a pair that may touch to `work.pairs`, or those of the pairs below it that may.
-
-    A pair of groups that move far for their size is appended itself: nearly all pairs below it may
-    touch on the piece, and fewer of them on its halves.
-
-    Args:
-        scene: The scene.
-        work: Scratch, with the current posture.
-        k: The pair.
-        moved: Bound on the motion of its shapes relative to each other [m].
-        extra: Added to the gap of each pair [m].
-        count: Number of pairs listed already.
-        most: Number of pairs after which to stop.
-
-    Returns:
-        Number of pairs listed.
-    """
-    pairs, stack, below = work.pairs, work.stack, scene.below
-    top = 0
-    while count < most:
-        if is_of_groups(scene, k) and moved <= FAR * scene.bound[k]:
-            for n in range(below[k, 0], below[k, 1]):
-                stack[top] = n
-                top += 1
-        else:
-            pairs[count] = k
-            count += 1
-        near = False
-        while top and not near:
-            top -= 1
-            k = stack[top]
-            i, j, base = scene.pair[k, 0], scene.pair[k, 1], scene.pair[k, 2]
-            place_shape(scene, work, i)
-            if base > 0:
-                place_shape(scene, work, j)
-            moved = work.motion[i, base]
-            near = _may_touch_on_piece(scene, work, k, moved, extra)
-        if not near:
-            break
-    return count
-
-
-@inner
-def _may_touch_on_piece(
+def may_touch_on_piece(
     scene: MotionScene, work: MotionWorkspace, k: int, moved: float, extra: float
 ) -> bool:
     """Return whether pair k may be closer than its gap, and `extra` [m], on the current piece.
@@ -321,7 +194,7 @@ def _may_touch_on_piece(
     shapes, within, of_groups = work.shapes, scene.gap[k] + extra, is_of_groups(scene, k)
     if moved == 0.0:
         if of_groups:
-            return _groups_may_touch(shapes, i, j, within)
+            return groups_may_touch(shapes, i, j, within)
         near = _may_touch(shapes, i, j, within, moved)
         return near and not _table_clears(scene, work, k, within, False)
     far = within + moved
@@ -371,11 +244,11 @@ def is_near_on_piece(scene: MotionScene, work: MotionWorkspace, k: int) -> bool:
     place_shape(scene, work, i)
     if base > 0:
         place_shape(scene, work, j)
-    return _may_touch_on_piece(scene, work, k, work.motion[i, base], ROUNDING)
+    return may_touch_on_piece(scene, work, k, work.motion[i, base], ROUNDING)
 
 
 @inner
-def _groups_may_touch(shapes: FloatArray, i: int, j: int, within: float) -> bool:
+def groups_may_touch(shapes: FloatArray, i: int, j: int, within: float) -> bool:
     """Return whether two shapes or boxes around groups may be closer than a distance [m].
 
     Two boxes may be unless a face of one separates them: what is in them is checked next anyway.
@@ -384,11 +257,11 @@ def _groups_may_touch(shapes: FloatArray, i: int, j: int, within: float) -> bool
         return False
     if shapes[i, TYPE] != BOX or shapes[j, TYPE] != BOX:
         return closer(shapes, i, shapes, j, within)
-    return not _face_separates(shapes, i, j, within) and not _face_separates(shapes, j, i, within)
+    return not face_separates(shapes, i, j, within) and not face_separates(shapes, j, i, within)
 
 
 @inner
-def _face_separates(shapes: FloatArray, i: int, j: int, within: float) -> bool:
+def face_separates(shapes: FloatArray, i: int, j: int, within: float) -> bool:
     """Return whether box i is at least a distance [m] beyond a face of box j."""
     x, y, z = (
         shapes[i, CENTRE] - shapes[j, CENTRE],

@@ -16,6 +16,7 @@ STACK = 256
 """Capacity of a stack of pairs: two for each level of the trees of both shapes."""
 MOST_PIECES = 16
 """Greatest number of pieces of a curve, a power of two."""
+NO_PAIR = -1
 DEPTH = 40
 """Greatest number of halvings of a curve: 2^-40 of any motion is below RESOLUTION of `edges`."""
 WIDE = 256
@@ -77,6 +78,20 @@ class MotionScene(NamedTuple):
     that of a robot body plus the number of bodies of the environment."""
     distances: DistanceTables
     """Tables of distances of bodies of the robot."""
+    leaf: FloatArray
+    """Centre and radius of the bounding sphere of each shape in a box around those of a link, in
+    the frame of the link [m], box by box, shape (4, n_leaf)."""
+    leaves: IntArray
+    """First and one after the last of the columns of `leaf` that are in each shape of the arm that
+    is a box in no other box, equal for others, shape (n_arm, 2)."""
+    leaf_shape: IntArray
+    """Number of each of these shapes, shape (n_leaf,)."""
+    leaf_pair: IntArray
+    """Pair of each column of `leaf` with each fixed shape, NO_PAIR if it is not checked, shape
+    (n_leaf, number of fixed shapes without boxes around others)."""
+    root: IntArray
+    """Box around shapes of a link in which each shape of the arm is, itself if it is in none, shape
+    (n_arm,)."""
     robot: int
     """Number of the first body of the robot in `body`."""
 
@@ -127,6 +142,12 @@ class MotionWorkspace(NamedTuple):
     """Pieces of the curve to certify: begin and end, in [0, 1], shape (WIDE + 2 * DEPTH, 2)."""
     stretch: IntArray
     """First pair and one after the last pair of each piece in `span`, shape as `span`."""
+    excess: FloatArray
+    """Squared distance of the bounding spheres of a link's shapes from the core of that shape, less
+    the square of what they must keep [m^2], shape (n_leaf,)."""
+    other: FloatArray
+    """The fixed shape that `leaves` compares with, in the frame of a link: its three axes, the
+    link's origin from its centre along them, and the half sizes of its core [m], shape (5, 3)."""
     contact: IntArray
     """The pair found in contact last, -1 for none, shape (1,)."""
     hits: IntArray
@@ -196,6 +217,11 @@ def torso_scene(problem: Problem, torso: int) -> MotionScene:
             ]
         ),
         distances=problem.distances,
+        leaf=np.zeros((4, 0)),
+        leaves=np.zeros((count, 2), np.int64),
+        root=np.arange(count),
+        leaf_shape=np.zeros(0, np.int64),
+        leaf_pair=np.zeros((0, len(fixed)), np.int64),
         robot=problem.environment_bodies,
         **pair_fields(links, fixed, pair[order].astype(np.int64), gap[order]),
     )
@@ -305,7 +331,9 @@ def new_motion_workspace(scene: MotionScene) -> MotionWorkspace:
         stack=np.empty(STACK, np.int64),
         span=np.empty((WIDE + 2 * DEPTH, 2)),
         stretch=np.empty((WIDE + 2 * DEPTH, 2), np.int64),
-        contact=np.full(1, -1, np.int64),
+        excess=np.empty(scene.leaf.shape[1]),
+        other=np.empty((5, 3)),
+        contact=np.full(1, NO_PAIR, np.int64),
         hits=np.zeros(pairs, np.int64),
     )
 

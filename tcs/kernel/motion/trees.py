@@ -47,6 +47,10 @@ class Trees(NamedTuple):
     """Start and goal that the path connects, shape (2,)."""
     met: IntArray
     """Node of each tree at which they have met, shape (2,)."""
+    cut: IntArray
+    """Edges of the path on which the two ends of a shortcut are, shape (2,)."""
+    blocked: IntArray
+    """Posture of the path from which on it is blocked, shape (1,)."""
     random: RandomState
     """State of the random numbers."""
 
@@ -66,6 +70,8 @@ def new_trees(seed: int) -> Trees:
         spare=np.empty((MOST_POINTS, 7)),
         ends=np.zeros(2, np.int64),
         met=np.zeros(2, np.int64),
+        cut=np.zeros(2, np.int64),
+        blocked=np.zeros(1, np.int64),
         random=random_state(seed),
     )
 

@@ -22,6 +22,7 @@ from tcs.kernel.problem import build_problem
 from tcs.kernel.verification.reference_motion import least_excess, straight_curve
 from tcs.kernel.verification.reference_pairs import placed_scene
 from tests.kernel.arms import drake_arm
+from tests.kernel.motion.test_planes import corners, place
 from tests.kernel.motion.toys import HERE, within_limits
 from tests.kernel.shapes import rotation
 from tests.kernel.toy import toy_grid, toy_scene
@@ -208,3 +209,38 @@ def test_shapes_of_the_base_are_in_boxes_at_every_torso_level(many, chain, rng):
 def test_an_arm_of_few_shapes_is_left_as_it_is(chain):
     scene = motion_scene(build_problem(toy_scene(chain, 0), toy_grid()), HERE)
     assert grouped(scene) is scene
+
+
+def test_the_motion_of_shapes_in_boxes_is_bounded(many, chain, rng):
+    """Of all links before their own, as pairs of two links need it."""
+    scene = grouped(motion_scene(build_problem(many, toy_grid()), HERE))
+    assert np.count_nonzero(scene.root != np.arange(len(scene.root))) > 50
+    work, closer = new_motion_workspace(scene), []
+    for _ in range(30):
+        start = within_limits(rng, chain)
+        control = start + np.linspace(0.0, 1.0, 4)[:, None] * rng.normal(size=7) * 0.1
+        control[1:3] += rng.normal(size=(2, 7)) * 0.01
+        place(scene, work, control, 0.5, 0.5)
+        bound = work.motion.copy()
+        middle, frames = corners(work.shapes[: len(scene.links)]), poses(work)
+        moved = np.zeros((len(scene.links), 8))
+        for t in np.linspace(0.0, 1.0, 11):
+            place(scene, work, control, t, 0.0)
+            here, now = corners(work.shapes[: len(scene.links)]), poses(work)
+            for base in range(7):
+                # The points as seen from the base link, moved back to where that was in the middle.
+                R = frames[0][base] @ now[0][base].T
+                seen = (here - now[1][base]) @ R.T + frames[1][base]
+                away = np.linalg.norm(seen - middle, axis=2).max(axis=1)
+                moved[:, base] = np.maximum(moved[:, base], away)
+        before = np.arange(8) < scene.link_frame[:, None]
+        # Rounding errors of positions are below 1e-12.
+        assert np.all(moved[before] <= bound[before] + 1e-12)
+        closer.append(bound[:, 0] < bound[scene.root, 0])
+    # Most shapes move less than the box around those of their link.
+    assert np.mean(closer) > 0.5
+
+
+def poses(work):
+    """Return orientations and origins of the links in A."""
+    return work.link_R.copy(), work.link_p.copy()

@@ -1,0 +1,168 @@
+"""Lists of pairs of shapes that may touch at a posture, or on a piece of a curve around it."""
+
+from __future__ import annotations
+
+from tcs.kernel.cache import inner
+from tcs.kernel.collide import CENTRE
+from tcs.kernel.motion.pairs import is_of_groups, may_touch_on_piece, place_shape
+from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
+
+FAR = 0.25
+"""Motion relative to the size of a pair of groups above which the piece is halved first."""
+GROUP = 16
+"""Number of pairs that one vector loop checks."""
+
+
+@inner
+def list_near(scene: MotionScene, work: MotionWorkspace, extra: float, most: int) -> int:
+    """List the pairs that may touch on the current piece from `work.pairs[0]` on.
+
+    Args:
+        scene: The scene.
+        work: Scratch, with the current posture.
+        extra: Added to the gap of each pair [m].
+        most: Number of pairs after which to stop.
+
+    Returns:
+        Number of pairs listed.
+    """
+    count = 0
+    for i in scene.roots:
+        place_shape(scene, work, i)
+    for i in scene.roots:
+        first, moving, last = scene.first_pair[i], scene.first_moving[i], scene.first_pair[i + 1]
+        while first < moving and count < most:
+            end = min(first + GROUP, moving)
+            apart = work.motion[i, 0] + extra
+            if any_overlap(scene, work, i, first, end, apart):
+                for k in range(first, end):
+                    if count < most and overlaps(scene, work, i, k, apart):
+                        count = append_near(scene, work, k, k + 1, extra, count, most)
+            first = end
+        if count < most:
+            count = append_near(scene, work, moving, last, extra, count, most)
+        if count == most:
+            return count
+    return count
+
+
+@inner
+def any_overlap(
+    scene: MotionScene, work: MotionWorkspace, i: int, first: int, last: int, extra: float
+) -> bool:
+    """Return whether bounding spheres of shape i and fixed shapes are closer than their gap.
+
+    Args:
+        scene: The scene.
+        work: Scratch, with the current posture.
+        i: Shape of the arm.
+        first: First pair.
+        last: One after the last pair.
+        extra: Added to the gap of each pair [m].
+    """
+    gap, bound = scene.gap[first:last], scene.bound[first:last]
+    u, v, w = scene.centre[0, first:last], scene.centre[1, first:last], scene.centre[2, first:last]
+    shapes = work.shapes
+    x, y, z = shapes[i, CENTRE], shapes[i, CENTRE + 1], shapes[i, CENTRE + 2]
+    overlaps = 0
+    # No branch and no early end: LLVM makes this loop a vector loop.
+    for n in range(len(gap)):
+        dx, dy, dz = u[n] - x, v[n] - y, w[n] - z
+        apart = bound[n] + gap[n] + extra
+        overlaps += int(dx * dx + dy * dy + dz * dz < apart * apart)
+    return overlaps > 0
+
+
+@inner
+def overlaps(scene: MotionScene, work: MotionWorkspace, i: int, k: int, extra: float) -> bool:
+    """Return whether pair k, of shape i and a fixed one, is as `any_overlap` says of some."""
+    shapes, centre = work.shapes, scene.centre
+    dx, dy, dz = (
+        centre[0, k] - shapes[i, CENTRE],
+        centre[1, k] - shapes[i, CENTRE + 1],
+        centre[2, k] - shapes[i, CENTRE + 2],
+    )
+    apart = scene.bound[k] + scene.gap[k] + extra
+    return dx * dx + dy * dy + dz * dz < apart * apart
+
+
+@inner
+def append_near(
+    scene: MotionScene,
+    work: MotionWorkspace,
+    first: int,
+    last: int,
+    extra: float,
+    count: int,
+    most: int,
+) -> int:
+    """Append pairs that may touch to `work.pairs`; return how many there are.
+
+    Args:
+        scene: The scene.
+        work: Scratch, with the current posture; the shapes of the pairs are placed.
+        first: First pair.
+        last: One after the last pair.
+        extra: Added to the gap of each pair [m].
+        count: Number of pairs listed already.
+        most: Number of pairs after which to stop.
+    """
+    for k in range(first, last):
+        moved = work.motion[scene.pair[k, 0], scene.pair[k, 2]]
+        if may_touch_on_piece(scene, work, k, moved, extra):
+            count = append_below(scene, work, k, moved, extra, count, most)
+            if count == most:
+                break
+    return count
+
+
+@inner
+def append_below(
+    scene: MotionScene,
+    work: MotionWorkspace,
+    k: int,
+    moved: float,
+    extra: float,
+    count: int,
+    most: int,
+) -> int:
+    """Append a pair that may touch to `work.pairs`, or those of the pairs below it that may.
+
+    A pair of groups that move far for their size is appended itself: nearly all pairs below it may
+    touch on the piece, and fewer of them on its halves.
+
+    Args:
+        scene: The scene.
+        work: Scratch, with the current posture.
+        k: The pair.
+        moved: Bound on the motion of its shapes relative to each other [m].
+        extra: Added to the gap of each pair [m].
+        count: Number of pairs listed already.
+        most: Number of pairs after which to stop.
+
+    Returns:
+        Number of pairs listed.
+    """
+    pairs, stack, below = work.pairs, work.stack, scene.below
+    top = 0
+    while count < most:
+        if is_of_groups(scene, k) and moved <= FAR * scene.bound[k]:
+            for n in range(below[k, 0], below[k, 1]):
+                stack[top] = n
+                top += 1
+        else:
+            pairs[count] = k
+            count += 1
+        near = False
+        while top and not near:
+            top -= 1
+            k = stack[top]
+            i, j, base = scene.pair[k, 0], scene.pair[k, 1], scene.pair[k, 2]
+            place_shape(scene, work, i)
+            if base > 0:
+                place_shape(scene, work, j)
+            moved = work.motion[i, base]
+            near = may_touch_on_piece(scene, work, k, moved, extra)
+        if not near:
+            break
+    return count
