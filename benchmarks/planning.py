@@ -4,9 +4,11 @@ Usage: python benchmarks/planning.py [--limit 100] [--compared 4] [--seeds 50] [
 
 The problems are MotionBenchMaker's (`planning_problems`), with the fingers as wide open as there.
 A cylinder becomes the prism of twelve sides around it, of six boxes. A problem is refused where
-start or goal is beyond a joint limit, in contact with itself or an obstacle, or nearer than the
-margins of scoring; the pairs that do so are counted. Times are those of the processor, one core,
-without preparing the scene. What the peers plan with is said in `planning_peers`.
+start or goal is beyond a joint limit, or in contact with itself or an obstacle; the pairs that do
+so are counted. Between arm and obstacles CLEARANCE is kept in place of the margin of scoring: there
+is no person, and the peers keep none. Times are those of the processor, one core, without preparing
+the scene and the memory of the planner, which is used again from query to query. What the peers
+plan with is said in `planning_peers`.
 """
 
 from __future__ import annotations
@@ -28,6 +30,7 @@ from tcs.kernel.motion.connect import connect
 from tcs.kernel.motion.edges import NO_PAIR, posture_contact
 from tcs.kernel.motion.groups import grouped
 from tcs.kernel.motion.idle import list_needed
+from tcs.kernel.motion.random import random_state
 from tcs.kernel.motion.scene import (
     MotionScene,
     MotionWorkspace,
@@ -44,6 +47,8 @@ from tcs.placement.scoring import load_job
 FloatArray = NDArray[np.float64]
 SIDES = 12
 """Sides of the prism around a cylinder, an even number."""
+CLEARANCE = 1e-4
+"""Distance that the arm keeps from obstacles [m]; the kernel compares with positive ones."""
 AGAIN = 10.0
 """Time after which a problem counts as unsolvable [s]."""
 MOST_ITERATIONS = 100_000
@@ -154,6 +159,7 @@ class Bench:
             p=p[None],
         )
         return arrays._replace(
+            margin=CLEARANCE,
             environment=environment,
             arm_vs_environment=np.ones((len(arrays.arm.type), number), np.bool_),
             body_vs_environment=np.zeros((len(arrays.body.type), number), np.bool_),
@@ -183,6 +189,7 @@ class Query:
         """Take memory for a planner."""
         self.problem, self.scene = problem, scene
         self.work: MotionWorkspace = new_motion_workspace(scene)
+        self.trees = new_trees(0)
 
     def refusal(self, bench: Bench) -> str:
         """Return what excludes start or goal, "" if nothing does."""
@@ -234,7 +241,8 @@ class Query:
 
     def planned(self, seed: int) -> float:
         """Return the length of a path [rad], inf if none was found."""
-        trees = new_trees(seed)
+        trees = self.trees
+        trees.random[:] = random_state(seed)
         ends = self.problem.start[None], self.problem.goal[None]
         count = connect(self.scene, self.work, trees, *ends, MOST_ITERATIONS, SHORTCUTS)
         return length(trees.path[:count]) if count else np.inf
