@@ -7,7 +7,8 @@ Arms with a closed form are compared with EAIK. Arms without one are those that 
 
 Poses are those of random postures, joints anywhere in a full turn. Solutions of a peer count if
 they bring the tool to its pose; ours are all confirmed by forward kinematics. ssik is not among the
-packages that `make` installs: `pip install ssik`.
+packages that `make` installs: `pip install ssik`. All poses are solved in one call, by EAIK in one
+thread; ssik takes one pose at a time.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from table import cell, header, parser, row, save
 
 from tcs.kernel.arrays import Chain, FloatArray
 from tcs.kernel.six_joints.arm import six_joint_arm
-from tcs.kernel.six_joints.solutions import MOST_SOLUTIONS, solve_six_joints
+from tcs.kernel.six_joints.solutions import MOST_SOLUTIONS, solve_poses
 from tcs.kernel.verification.reference import compose, link_poses
 from tcs.model.robots import load_robot
 from tcs.model.scene import EMPTY_ENVIRONMENT, Scene, SceneSpec, arm_chain
@@ -110,15 +111,18 @@ def solved(
     chain: Chain, targets: list[tuple[FloatArray, FloatArray]]
 ) -> tuple[list[FloatArray], float]:
     """Return our solutions for each pose, joint limits left aside, and the processor time [s]."""
-    arm, out = six_joint_arm(chain), np.empty((MOST_SOLUTIONS, 7))
-    prepared = [(np.ascontiguousarray(R), p) for R, p in targets]
+    arm = six_joint_arm(chain)
+    R = np.array([R for R, _ in targets])
+    p = np.array([p for _, p in targets])
+    # Filled, so that its memory is there before the time is taken.
+    out = np.full((len(targets), MOST_SOLUTIONS, 7), np.nan)
+    counts = np.zeros(len(targets), np.int64)
     # Load or compile the machine code.
-    solve_six_joints(arm, *prepared[0], out)
-    found, begun = [], time.process_time()
-    for R, p in prepared:
-        count = solve_six_joints(arm, R, p, out)
-        found.append(out[:count].copy())
-    return found, time.process_time() - begun
+    solve_poses(arm, R[:1], p[:1], out, counts)
+    begun = time.process_time()
+    solve_poses(arm, R, p, out, counts)
+    seconds = time.process_time() - begun
+    return [found[:count] for found, count in zip(out, counts, strict=True)], seconds
 
 
 def solved_by_eaik(
@@ -132,7 +136,7 @@ def solved_by_eaik(
     for X, (R, p) in zip(matrices, targets, strict=True):
         X[:3, :3], X[:3, 3] = R, p
     begun = time.process_time()
-    answers = [arm.IK(X) for X in matrices]
+    answers = arm.IK_batched(matrices, 1)
     seconds = time.process_time() - begun
     found = []
     for answer, (R, p) in zip(answers, targets, strict=True):

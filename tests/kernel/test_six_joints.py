@@ -14,7 +14,12 @@ from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.problem import build_problem
 from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED, TOO_FAR
 from tcs.kernel.six_joints.arm import is_general, six_joint_arm
-from tcs.kernel.six_joints.solutions import MOST_SOLUTIONS, six_joint_solutions
+from tcs.kernel.six_joints.solutions import (
+    MOST_SOLUTIONS,
+    six_joint_solutions,
+    solve_poses,
+    solve_six_joints,
+)
 from tcs.kernel.verification.dense import dense_scan
 from tcs.kernel.verification.newton_solutions import newton_solutions, within
 from tcs.kernel.verification.reference import jacobian, link_poses, measured
@@ -94,6 +99,35 @@ def bent_wrist(name):
         c, s = np.cos(alpha), np.sin(alpha)
         R[i + 2], p[i + 2] = [[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]], [a, 0.0, d]
     return Chain(R, p, np.full(7, -np.inf), np.full(7, np.inf), joints=6)
+
+
+def offset_arm():
+    """Return FANUC's CRX-10iA, whose last axis passes the one before it, without joint limits."""
+    R, p = np.tile(np.eye(3), (8, 1, 1)), np.ps((8, 3))
+    R[1] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    R[2] = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]
+    R[3] = np.diag([-1.0, 1.0, -1.0])
+    R[4] = R[5] = R[6] = [[-1, 0, 0], [0, 0, 1], [0, 1, 0]]
+    R[7] = [[0, 0, -1], [0, -1, 0], [-1, 0, 0]]
+    p[1, 2], p[3, 0], p[5, 2], p[6, 2], p[7, 2] = 0.245, -0.54, -0.54, 0.15, -0.16
+    return Chain(R, p, np.full(7, -np.inf), np.full(7, np.inf), joints=6)
+
+
+def meeting_angle(chain, joint):
+    """Return an angle of a joint at which its two solutions meet.
+
+    The angle extremises the height of the next axis but one, or the distance of the axes.
+    """
+    before, after = chain.R[joint], chain.R[joint + 1][:, 2]
+    if joint == 5:
+        row = before[2]
+        cosine, sine = row[0] * after[0] + row[1] * after[1], row[1] * after[0] - row[0] * after[1]
+        return np.arctan2(sine, cosine)
+    p, w = chain.R[joint].T @ chain.p[joint], chain.p[joint + 1]
+    if np.hypot(*chain.R[joint][:2, 2]) < 1e-9:
+        p, w = p * [1.0, 1.0, 0.0], w * [1.0, 1.0, 0.0]
+    # |R^T p + Rz w|^2 has this single cosine.
+    return np.arctan2(p[1] * w[0] - p[0] * w[1], p[0] * w[0] + p[1] * w[1])
 
 
 def drawn(rng, chain):
@@ -225,6 +259,59 @@ def test_elimination_finds_the_solutions_of_a_last_axis_parallel_to_the_first(p)
     expected = newton_solutions(chain, FLIP, np.array(p))
     assert len(expected) >= 4
     assert all(is_among(other, found) for other in expected)
+
+
+def test_elimination_finds_solutions_whose_angles_differ_by_less_than_a_root_is_exact():
+    # FANUC's CRX-10iA: the second joints of two pairs are 2e-8 apart, of two others 5e-7.
+    chain = offset_arm()
+    q = np.zeros(7)
+    q[1:4] = 2.724111626476, 3.137503232577, 3.104028799456
+    q[4:] = 1.557506561692, 1.556539921104, 1.642077856296
+    R, p = link_poses(chain, q)[-1]
+    found = six_joint_solutions(six_joint_arm(chain), R, p)
+    assert len(found) == 8
+    assert is_among(q, found)
+    assert all(is_among(other, found) for other in newton_solutions(chain, R, p))
+
+
+@pytest.mark.parametrize("name", [*CLASSES, "bent"])
+def test_many_poses_have_the_solutions_of_each(name, rng):
+    chain = bent_wrist(name) if name == "bent" else six_joint_chain(name, 1, limited=False)
+    arm = six_joint_arm(chain)
+    poses = [drawn(rng, chain)[1] for _ in range(20)]
+    R, p = (np.array(values) for values in zip(*poses, strict=True))
+    # A goal that no arm reaches has none.
+    p[7] += 50.0
+    solutions, counts = np.empty((20, MOST_SOLUTIONS, 7)), np.zeros(20, np.int64)
+    solve_poses(arm, R, p, solutions, counts)
+    assert counts[7] == 0
+    assert counts.min(initial=9, where=np.arange(20) != 7) > 0
+    for n, count in enumerate(counts):
+        expected = np.empty((MOST_SOLUTIONS, 7))
+        assert solve_six_joints(arm, R[n].copy(), p[n].copy(), expected) == count
+        np.testing.assert_array_equal(solutions[n, :count], expected[:count])
+
+
+@pytest.mark.parametrize("name", ["spherical wrist", "parallel axes"])
+@pytest.mark.parametrize("off", [0.0, 1e-13, 1e-9, 1e-7, 1e-5, 1e-3])
+def test_closed_forms_find_postures_next_to_straight_joints(name, off):
+    # Each joint but the first at the angle where its two solutions meet, or next to it.
+    chain, rng = six_joint_chain(name, 2, limited=False), np.random.default_rng(1)
+    arm = six_joint_arm(chain)
+    for joint in (3, 5):
+        for _ in range(20):
+            q, _ = drawn(rng, chain)
+            q[joint] = meeting_angle(chain, joint) + off
+            R, p = link_poses(chain, q)[-1]
+            found = six_joint_solutions(arm, R, p)
+            assert len(found) >= 1
+            for other in found:
+                S, s = link_poses(chain, other)[-1]
+                np.testing.assert_allclose(S, R, atol=1e-7)
+                np.testing.assert_allclose(s, p, atol=1e-7)
+            # Closer to it, posture and mirror image are equal but for rounding.
+            if off >= 1e-5:
+                assert is_among(q, found)
 
 
 def test_an_arm_with_the_same_axis_twice_is_refused():

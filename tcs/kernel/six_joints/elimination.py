@@ -18,10 +18,16 @@ from tcs.kernel.six_joints.equations import (
     eliminate,
     fill_first_transform,
     fill_right_side,
-    swap_columns,
     swap_rows,
 )
 from tcs.kernel.six_joints.general import EQUATIONS, FORWARDS, GeneralArm
+from tcs.kernel.six_joints.null_space import (
+    MOST_VECTORS,
+    OF_D,
+    OF_E,
+    half_angle,
+    null_vectors,
+)
 from tcs.kernel.six_joints.roots import fill_eliminant, find_roots
 
 MOST_ROOTS = 48
@@ -42,8 +48,12 @@ a special position."""
 ASIDE = 1e-2, -2e-2, 5e-2
 """Displacements of a goal while the roots are searched, in units of the arm's size and [rad]: the
 others are tried if arm and goal are in a special position."""
-SAME = 1e-12
-"""One minus the cosine of the difference of angles that are equal but for rounding."""
+STRAY = 1e-4
+"""Greatest distance of a solution from its root [rad]: a root is exact to 1e-6, unless arm and goal
+are in a special position."""
+SAME = 1.4e-6
+"""Difference of equal angles [rad]: next to a singularity, rounding is magnified so far."""
+TURN = 2.0 * np.pi
 
 
 @inner
@@ -99,22 +109,28 @@ def _solve_beside(
     if eliminate(arm, values, table, products) < DEGENERATE:
         return found, True
     roots = np.empty((MOST_ROOTS, 2))
-    is_special = False
-    matrix, vector, order = np.empty((12, 12)), np.empty(12), np.empty(12, np.int64)
-    for n in range(find_roots(table, roots)):
-        fill_eliminant(table, np.cos(roots[n, 0]), np.sin(roots[n, 0]), matrix)
-        _null_vector(matrix, order, vector)
-        q = np.empty(7)
-        _joints(arm, table, products, roots[n, 0], vector, q)
-        is_solution = _refined(arm, R, p, R_AG, p_AG, q)
-        if is_solution and not is_known(solutions, found, q):
-            if found == len(solutions):
-                break
-            copy_joints(q, solutions[found])
-            found += 1
-        elif roots[n, 1] > 0.0:
-            # A certain root without a solution of its own.
-            is_special = True
+    matrix, order = np.empty((12, 12)), np.empty(12, np.int64)
+    vectors, q = np.empty((MOST_VECTORS + 2, 12)), np.empty(7)
+    count, begun, certain, is_special = find_roots(table, roots), found, 0, False
+    for is_double in (False, True):
+        for n in range(count):
+            c = roots[n, 0]
+            if (roots[n, 1] == 0.0) != is_double:
+                continue
+            certain += 0 if is_double else 1
+            fill_eliminant(table, np.cos(c), np.sin(c), matrix)
+            for k in range(null_vectors(matrix, is_double, order, vectors)):
+                _joints(arm, table, products, c, vectors[k], q)
+                is_solution = _refined(arm, R, p, R_AG, p_AG, q)
+                if k == 0 and not is_double:
+                    off = q[2] - c if arm.direction == FORWARDS else q[5] + c
+                    is_special = is_special or abs(off - TURN * np.rint(off / TURN)) > STRAY
+                if is_solution and found < len(solutions) and not is_known(solutions, found, q):
+                    copy_joints(q, solutions[found])
+                    found += 1
+        if not is_double:
+            # Each root has a solution, or two that lie close together give both at the first.
+            is_special = is_special or found - begun < certain
     return found, is_special
 
 
@@ -122,62 +138,15 @@ def _solve_beside(
 def is_known(solutions: FloatArray, count: int, q: FloatArray) -> bool:
     """Return whether joints repeat one of the first solutions, but for full turns."""
     for m in range(count):
-        apart = 0.0
+        is_same = True
         for k in range(1, 7):
-            apart = max(apart, 1.0 - np.cos(solutions[m, k] - q[k]))
-        if apart < SAME:
+            off = solutions[m, k] - q[k]
+            if abs(off - TURN * np.rint(off / TURN)) > SAME:
+                is_same = False
+                break
+        if is_same:
             return True
     return False
-
-
-@inner
-def _null_vector(A: FloatArray, order: IntArray, vector: FloatArray) -> None:
-    """Fill the null vector of A, shape (12, 12), by full pivoting; A is overwritten."""
-    for n in range(12):
-        order[n] = n
-    rank = 11
-    for n in range(11):
-        row, column, best = n, n, 0.0
-        for i in range(n, 12):
-            for j in range(n, 12):
-                if abs(A[i, j]) > best:
-                    row, column, best = i, j, abs(A[i, j])
-        if best == 0.0:
-            rank = n
-            break
-        swap_rows(A, n, row)
-        swap_columns(A, n, column)
-        order[n], order[column] = order[column], order[n]
-        for i in range(n + 1, 12):
-            factor = A[i, n] / A[n, n]
-            for j in range(n + 1, 12):
-                A[i, j] -= factor * A[n, j]
-    for n in range(12):
-        vector[n] = 0.0
-    vector[order[rank]] = 1.0
-    for i in range(rank - 1, -1, -1):
-        total = 0.0
-        for j in range(i + 1, rank + 1):
-            total += A[i, j] * vector[order[j]]
-        vector[order[i]] = -total / A[i, i]
-
-
-@inner
-def _half_angle(vector: FloatArray, stride: int) -> float:
-    """Return the angle of d (stride 3) or e (stride 1) from the null vector.
-
-    Entries x_d^i x_e^j and the next power stand as cosine and sine of half the angle.
-    """
-    best, angle = 0.0, 0.0
-    for i in range(4):
-        for j in range(3):
-            if (stride == 3 and i == 3) or (stride == 1 and j == 2):
-                continue
-            low, high = vector[3 * i + j], vector[3 * i + j + stride]
-            size = low * low + high * high
-            if size > best:
-                best, angle = size, 2.0 * np.arctan2(high, low)
-    return angle
 
 
 @inner
@@ -196,10 +165,10 @@ def _joints(
         table: From `eliminate`.
         products: From `eliminate`.
         c: The root [rad].
-        vector: From `_null_vector`.
+        vector: From `null_vectors`.
         q: Filled [rad], shape (7,).
     """
-    d, e = _half_angle(vector, 3), _half_angle(vector, 1)
+    d, e = half_angle(vector, OF_D), half_angle(vector, OF_E)
     with_c = (1.0, np.cos(c), np.sin(c))
     # 1, x and x^2 over 1 + x^2, with x the tangent of half the angle.
     with_d = (0.5 * (1.0 + np.cos(d)), 0.5 * np.sin(d), 0.5 * (1.0 - np.cos(d)))
