@@ -114,11 +114,10 @@ def solved(
     arm = six_joint_arm(chain)
     R = np.array([R for R, _ in targets])
     p = np.array([p for _, p in targets])
-    # Filled, so that its memory is there before the time is taken.
-    out = np.full((len(targets), MOST_SOLUTIONS, 7), np.nan)
+    out = np.empty((len(targets), MOST_SOLUTIONS, 7))
     counts = np.zeros(len(targets), np.int64)
-    # Load or compile the machine code.
-    solve_poses(arm, R[:1], p[:1], out, counts)
+    # Load or compile the machine code, and get the memory.
+    solve_poses(arm, R, p, out, counts)
     begun = time.process_time()
     solve_poses(arm, R, p, out, counts)
     seconds = time.process_time() - begun
