@@ -31,8 +31,8 @@ class Workspace(NamedTuple):
     """Scratch of one worker, reused from pair to pair."""
 
     arm: FloatArray
-    """Rows of `Problem.links` in A at the current posture; the shapes only of groups that
-    `is_placed` names."""
+    """Rows of `Problem.links` in A at the current posture; of groups that `is_placed` does not name
+    only the shapes that were looked at."""
     is_placed: BoolArray
     """Whether the shapes of each group of the arm are up to date, shape (arm groups,)."""
     touching: IntArray
@@ -324,10 +324,90 @@ def _environment_touches(
     """
     arm, first, gaps = work.arm, problem.link_first, problem.gap_environment
     box = first[-1] + g
-    if not closer(arm, box, environment, j, gaps[box, j]):
-        return False
-    _place_shapes(problem, work, g)
-    return _shapes_touch(arm, first, g, environment, j, gaps, work.touching)
+    return closer(arm, box, environment, j, gaps[box, j]) and _link_touches_shape(
+        problem, work, g, environment, j, gaps
+    )
+
+
+@inner
+def _link_touches_shape(
+    problem: Problem, work: Workspace, g: int, b: FloatArray, j: int, gaps: FloatArray
+) -> bool:
+    """Return whether a shape of group g of the arm touches row j of b; fills `work.touching`.
+
+    Only shapes whose bounding spheres touch that of the row are placed.
+    """
+    arm, first, touching = work.arm, problem.link_first, work.touching
+    touching[0], touching[1] = first[g], j
+    # The box of a single shape is the shape, and touches.
+    if first[g + 1] - first[g] == 1:
+        return True
+    x, y, z = _seen_from_link(problem, work, g, b, j)
+    for i in range(first[g], first[g + 1]):
+        gap = gaps[i, j]
+        if gap > 0.0 and _is_near(problem.links, i, x, y, z, b[j, BOUND] + gap):
+            _place_link(problem, work, i)
+            if closer(arm, i, b, j, gap):
+                touching[0] = i
+                return True
+    return False
+
+
+@inner
+def _link_touches_group(
+    problem: Problem,
+    work: Workspace,
+    g: int,
+    b: FloatArray,
+    first_b: IntArray,
+    h: int,
+    gaps: FloatArray,
+) -> bool:
+    """Return whether a shape of group g of the arm touches one of group h of b, in place.
+
+    Fills `work.touching`. Of group g, only shapes whose bounding spheres touch that of the box
+    around group h are placed.
+    """
+    if first_b[h + 1] - first_b[h] == 1:
+        return _link_touches_shape(problem, work, g, b, first_b[h], gaps)
+    arm, first, touching, box = work.arm, problem.link_first, work.touching, first_b[-1] + h
+    x, y, z = _seen_from_link(problem, work, g, b, box)
+    for i in range(first[g], first[g + 1]):
+        gap = gaps[i, box]
+        if gap <= 0.0 or not _is_near(problem.links, i, x, y, z, b[box, BOUND] + gap):
+            continue
+        _place_link(problem, work, i)
+        if not closer(arm, i, b, box, gap):
+            continue
+        for j in range(first_b[h], first_b[h + 1]):
+            gap = gaps[i, j]
+            if gap > 0.0 and spheres_overlap(arm, i, b, j, gap) and closer(arm, i, b, j, gap):
+                touching[0], touching[1] = i, j
+                return True
+    return False
+
+
+@inner
+def _seen_from_link(
+    problem: Problem, work: Workspace, g: int, b: FloatArray, j: int
+) -> tuple[float, float, float]:
+    """Return the centre of row j of b in the frame of group g's link [m]."""
+    frame = problem.link_frame[problem.link_first[g]]
+    R, p = work.link_R[frame], work.link_p[frame]
+    x, y, z = b[j, CENTRE] - p[0], b[j, CENTRE + 1] - p[1], b[j, CENTRE + 2] - p[2]
+    return (
+        R[0, 0] * x + R[1, 0] * y + R[2, 0] * z,
+        R[0, 1] * x + R[1, 1] * y + R[2, 1] * z,
+        R[0, 2] * x + R[1, 2] * y + R[2, 2] * z,
+    )
+
+
+@inner
+def _is_near(links: FloatArray, i: int, x: float, y: float, z: float, reach: float) -> bool:
+    """Return whether the bounding sphere of shape i is within a distance [m] of a point."""
+    x, y, z = x - links[i, CENTRE], y - links[i, CENTRE + 1], z - links[i, CENTRE + 2]
+    apart = links[i, BOUND] + reach
+    return x * x + y * y + z * z < apart * apart
 
 
 @inner
@@ -373,10 +453,9 @@ def _body_touches(problem: Problem, work: Workspace, body_A: FloatArray, g: int,
     """Return whether group g of the arm touches group h of the body; fills `work.touching`."""
     arm, first, others, gaps = work.arm, problem.link_first, problem.body_first, problem.gap_body
     box, other = first[-1] + g, others[-1] + h
-    if not closer(arm, box, body_A, other, gaps[box, other]):
-        return False
-    _place_shapes(problem, work, g)
-    return groups_touch(arm, first, g, body_A, others, h, gaps, work.touching)
+    return closer(arm, box, body_A, other, gaps[box, other]) and _link_touches_group(
+        problem, work, g, body_A, others, h, gaps
+    )
 
 
 @inner
@@ -386,9 +465,8 @@ def _arm_touches(problem: Problem, work: Workspace, g: int, h: int) -> bool:
     box, other = first[-1] + g, first[-1] + h
     if not closer(arm, box, arm, other, gaps[box, other]):
         return False
-    _place_shapes(problem, work, g)
     _place_shapes(problem, work, h)
-    return groups_touch(arm, first, g, arm, first, h, gaps, work.touching)
+    return _link_touches_group(problem, work, g, arm, first, h, gaps)
 
 
 @inner
