@@ -103,7 +103,7 @@ def bent_wrist(name):
 
 def offset_arm():
     """Return FANUC's CRX-10iA, whose last axis passes the one before it, without joint limits."""
-    R, p = np.tile(np.eye(3), (8, 1, 1)), np.ps((8, 3))
+    R, p = np.tile(np.eye(3), (8, 1, 1)), np.zeros((8, 3))
     R[1] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
     R[2] = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]
     R[3] = np.diag([-1.0, 1.0, -1.0])
