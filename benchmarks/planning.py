@@ -256,7 +256,7 @@ def report(scene: str, problems: int, found: list[Found]) -> None:
     cells = {
         "not refused": f"{len(found)} of {problems}",
         "solved, of those solvable": f"{len(solved)} of {solvable}",
-        "median [ms]": f"{times[0]:.1f}",
+        "median [ms]": f"{times[0]:.2f}",
         "p95 [ms]": f"{times[1]:.0f}",
         "slowest [ms]": f"{times[2]:.0f}",
         "median length [rad]": f"{np.median([one.length for one in solved]):.2f}",
