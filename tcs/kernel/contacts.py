@@ -14,6 +14,7 @@ from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant, jit
 from tcs.kernel.collide import BOUND, CENTRE, closer, move, spheres_overlap
 from tcs.kernel.distances import are_apart
+from tcs.kernel.group_contacts import group_touches
 from tcs.kernel.kinematics import link_poses
 from tcs.kernel.problem import Problem
 
@@ -112,7 +113,7 @@ def base_contact(problem: Problem, work: Workspace, torso: int, mount: int) -> i
                 mounts[first[g]] == mount
                 and gap > 0.0
                 and spheres_overlap(body, boxes + g, environment, j, gap)
-                and _group_touches(body, first, g, environment, j, gaps, work.touching)
+                and group_touches(body, first, g, environment, j, gaps, work.touching)
             ):
                 i = work.touching[0]
                 return contact_code(
@@ -411,44 +412,6 @@ def _is_near(links: FloatArray, i: int, x: float, y: float, z: float, reach: flo
 
 
 @inner
-def _group_touches(
-    a: FloatArray,
-    first: IntArray,
-    g: int,
-    b: FloatArray,
-    j: int,
-    gaps: FloatArray,
-    touching: IntArray,
-) -> bool:
-    """Return whether group g of a, with its shapes in place, touches shape j of b."""
-    box = first[-1] + g
-    return closer(a, box, b, j, gaps[box, j]) and _shapes_touch(a, first, g, b, j, gaps, touching)
-
-
-@inner
-def _shapes_touch(
-    a: FloatArray,
-    first: IntArray,
-    g: int,
-    b: FloatArray,
-    j: int,
-    gaps: FloatArray,
-    touching: IntArray,
-) -> bool:
-    """Return whether a shape of group g of a touches row j of b; fills `touching`."""
-    touching[0], touching[1] = first[g], j
-    # The box of a single shape is the shape, and touches.
-    if first[g + 1] - first[g] == 1:
-        return True
-    for i in range(first[g], first[g + 1]):
-        gap = gaps[i, j]
-        if gap > 0.0 and spheres_overlap(a, i, b, j, gap) and closer(a, i, b, j, gap):
-            touching[0] = i
-            return True
-    return False
-
-
-@inner
 def _body_touches(problem: Problem, work: Workspace, body_A: FloatArray, g: int, h: int) -> bool:
     """Return whether group g of the arm touches group h of the body; fills `work.touching`."""
     arm, first, others, gaps = work.arm, problem.link_first, problem.body_first, problem.gap_body
@@ -467,33 +430,6 @@ def _arm_touches(problem: Problem, work: Workspace, g: int, h: int) -> bool:
         return False
     _place_shapes(problem, work, h)
     return _link_touches_group(problem, work, g, arm, first, h, gaps)
-
-
-@inner
-def groups_touch(
-    a: FloatArray,
-    first_a: IntArray,
-    g: int,
-    b: FloatArray,
-    first_b: IntArray,
-    h: int,
-    gaps: FloatArray,
-    touching: IntArray,
-) -> bool:
-    """Return whether a shape of group g of a touches one of group h of b; fills `touching`."""
-    if first_b[h + 1] - first_b[h] == 1:
-        return _shapes_touch(a, first_a, g, b, first_b[h], gaps, touching)
-    box = first_b[-1] + h
-    for i in range(first_a[g], first_a[g + 1]):
-        gap = gaps[i, box]
-        if gap <= 0.0 or not spheres_overlap(a, i, b, box, gap):
-            continue
-        for j in range(first_b[h], first_b[h + 1]):
-            gap = gaps[i, j]
-            if gap > 0.0 and spheres_overlap(a, i, b, j, gap) and closer(a, i, b, j, gap):
-                touching[0], touching[1] = i, j
-                return True
-    return False
 
 
 @inner

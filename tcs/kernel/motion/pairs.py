@@ -257,11 +257,11 @@ def groups_may_touch(shapes: FloatArray, i: int, j: int, within: float) -> bool:
         return False
     if shapes[i, TYPE] != BOX or shapes[j, TYPE] != BOX:
         return closer(shapes, i, shapes, j, within)
-    return not face_separates(shapes, i, j, within) and not face_separates(shapes, j, i, within)
+    return not _face_separates(shapes, i, j, within) and not _face_separates(shapes, j, i, within)
 
 
 @inner
-def face_separates(shapes: FloatArray, i: int, j: int, within: float) -> bool:
+def _face_separates(shapes: FloatArray, i: int, j: int, within: float) -> bool:
     """Return whether box i is at least a distance [m] beyond a face of box j."""
     x, y, z = (
         shapes[i, CENTRE] - shapes[j, CENTRE],

@@ -16,12 +16,12 @@ from tcs.kernel.contacts import (
     at_goal,
     gripper_body_contact,
     gripper_contact_at,
-    groups_touch,
     new_workspace,
     place_coupled_links,
 )
 from tcs.kernel.dexterity.measures import measure_at, rounded_inward
 from tcs.kernel.freedom.forms import FEWEST_JOINTS, pose_of
+from tcs.kernel.group_contacts import groups_touch
 from tcs.kernel.kinematics import link_poses
 from tcs.kernel.motion.postures import postures_at
 from tcs.kernel.problem import Problem, gaps_between
