@@ -9,8 +9,9 @@ import numpy as np
 
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.kinematics import tool_pose
-from tcs.kernel.motion.edges import NO_PAIR, posture_contact
+from tcs.kernel.motion.edges import posture_contact
 from tcs.kernel.motion.postures import postures_at
+from tcs.kernel.motion.scene import NO_PAIR
 from tcs.kernel.motion.straight import (
     BLOCKED,
     DONE,

@@ -10,10 +10,11 @@ import numpy as np
 
 from tcs.errors import TaskError
 from tcs.kernel.arrays import FloatArray
-from tcs.kernel.motion.edges import NO_PAIR, posture_contact
+from tcs.kernel.motion.edges import posture_contact
 from tcs.kernel.motion.groups import grouped
 from tcs.kernel.motion.idle import needed_pairs
 from tcs.kernel.motion.scene import (
+    NO_PAIR,
     MotionScene,
     MotionWorkspace,
     carriers,
