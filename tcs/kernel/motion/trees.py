@@ -33,6 +33,8 @@ class Trees(NamedTuple):
     """Number of these that are roots, shape (2,)."""
     certified: IntArray
     """1 where the edge to a node is certified, shape (2, MOST_NODES)."""
+    failures: IntArray
+    """Number of blocked steps from each node, shape (2, MOST_NODES)."""
     renumbered: IntArray
     """Scratch: new number of each node, NONE for those removed, shape (MOST_NODES,)."""
     target: FloatArray
@@ -63,6 +65,7 @@ def new_trees(seed: int) -> Trees:
         nodes=np.zeros(2, np.int64),
         roots=np.zeros(2, np.int64),
         certified=np.empty((2, MOST_NODES), np.int64),
+        failures=np.zeros((2, MOST_NODES), np.int64),
         renumbered=np.empty(MOST_NODES, np.int64),
         target=np.empty((2, 7)),
         turned=np.empty(7),
