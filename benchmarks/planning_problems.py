@@ -15,7 +15,9 @@ import tarfile
 import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial, reduce
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import yaml
@@ -32,6 +34,7 @@ FINGERS = {"panda_finger_joint1": 0.065}
 """How far each finger is from the middle in the start states of all problems [m]: 25 mm beyond the
 limit of the joint."""
 _PROBLEMS = "resources/panda/problems.tar.bz2"
+_URDF = "resources/panda/panda.urdf"
 _JOINTS = tuple(f"panda_joint{i}" for i in range(1, 8))
 
 
@@ -61,21 +64,47 @@ class Problem:
 
 
 def robot_of_problems() -> RobotFile:
-    """Return the Panda with the fingers of the problems."""
+    """Return the Panda with the fingers and the arm's joint limits of the problems.
+
+    Their elbow, joint 4, opens to 5 deg beyond straight and closes to 180 deg; the manufacturer's
+    limits, which our file has, are -4 and -176 deg.
+    """
+    panda = load_robot("panda")
+    folder = cache_folder() / "benchmarks"
+    urdf = folder / "panda_of_problems.urdf"
+    theirs, ours = _file(_URDF).decode(), panda.urdf_path().read_text()
+    folder.mkdir(parents=True, exist_ok=True)
+    urdf.write_text(reduce(partial(_with_limits_of, theirs), _JOINTS, ours))
     fingers = {"gripper": "problems", "grippers": {"problems": FINGERS}}
-    return load_robot("panda").model_copy(update=fingers)
+    return panda.model_copy(update={"urdf": str(urdf), **fingers})
+
+
+def _with_limits_of(other: str, urdf: str, joint: str) -> str:
+    """Return a URDF with the limits that another one has for a joint."""
+    limits = ElementTree.fromstring(other).find(f"joint[@name='{joint}']/limit")
+    robot = ElementTree.fromstring(urdf)
+    own = robot.find(f"joint[@name='{joint}']/limit")
+    if limits is None or own is None:
+        raise SystemExit(f"planning_problems: no limits of {joint}")
+    own.attrib.update({end: limits.attrib[end] for end in ("lower", "upper")})
+    return ElementTree.tostring(robot, encoding="unicode")
 
 
 def planning_problems() -> list[Problem]:
     """Return the 700 problems, by scene and number."""
-    with tarfile.open(_distribution()) as distribution:
-        member = next(m for m in distribution if m.name.endswith(_PROBLEMS))
-        packed = distribution.extractfile(member)
-        if packed is None:
-            raise SystemExit(f"planning_problems: {_PROBLEMS} is not a file of {PACKAGE}")
-        files = dict(_yaml_files(packed.read()))
+    files = dict(_yaml_files(_file(_PROBLEMS)))
     requests = sorted(name for name in files if "/request" in name)
     return [_problem(name, files) for name in requests]
+
+
+def _file(name: str) -> bytes:
+    """Return the content of a file of the source distribution."""
+    with tarfile.open(_distribution()) as distribution:
+        member = next((m for m in distribution if m.name.endswith(f"/{name}")), None)
+        content = distribution.extractfile(member) if member else None
+        if content is None:
+            raise SystemExit(f"planning_problems: {name} is not a file of {PACKAGE}")
+        return content.read()
 
 
 def _distribution() -> Path:
