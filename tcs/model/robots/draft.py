@@ -23,8 +23,10 @@ from tcs.model.robots.robot_file import (
 from tcs.model.robots.self_collision import (
     DRAWS,
     Blocked,
+    SurfaceDistance,
     blocked_at_boxes,
     blocked_by_shapes,
+    carried_surfaces,
     free_posture,
     propose_disabled_pairs,
 )
@@ -70,7 +72,7 @@ class DraftOptions:
         collision_meshes: Whether the collision geometry of a link, if there is any, is its whole
             surface.
         ignore: Links that nothing is checked against.
-        jobs: Number of processes that fit shapes; does not change the results.
+        jobs: Number of processes; does not change the results.
     """
 
     base: str | None = None
@@ -162,14 +164,15 @@ def draft_robot(
         rest = free_posture(robot)
         robot = robot.model_copy(update={"rest": rest or {}})
         robot, axes = with_goal_axes(robot)
-        found = _blocked(robot, steps)
+        surfaces = carried_surfaces(robot)
+        found = _blocked(robot, surfaces, steps)
         if not options.coarse and max(by.fraction for by in found) > _ALLOWED:
             splits = _to_tighten(model, primitives, found)
-            primitives = tightened(robot, primitives, splits)
+            primitives = tightened(robot, primitives, splits, jobs=options.jobs)
             write_primitives(shapes, primitives)
             steps.repeat(len(found))
             # Others than those that chose the bodies.
-            found = _blocked(robot, steps, seed=1)
+            found = _blocked(robot, surfaces, steps, seed=1)
         blocked, at_boxes = found
     worst = max(fits, key=lambda found: found.fit.excess)
     remarks = [
@@ -194,11 +197,13 @@ def draft_robot(
     return Draft(robot=robot, primitives=primitives, remarks=tuple(remarks))
 
 
-def _blocked(robot: RobotFile, steps: _Steps, seed: int = 0) -> tuple[Blocked, Blocked]:
+def _blocked(
+    robot: RobotFile, surfaces: SurfaceDistance, steps: _Steps, seed: int = 0
+) -> tuple[Blocked, Blocked]:
     """Return what the shapes block by self-collision and at boxes although surfaces are free."""
-    blocked = blocked_by_shapes(robot, seed=seed)
+    blocked = blocked_by_shapes(robot, seed=seed, surfaces=surfaces)
     steps.test_done()
-    at_boxes = blocked_at_boxes(robot, seed=seed)
+    at_boxes = blocked_at_boxes(robot, seed=seed, surfaces=surfaces)
     steps.test_done()
     return blocked, at_boxes
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
+from tcs.model.robots.cutting import distinct
 from tcs.model.robots.primitives import Primitive, rotation_of
 
 FloatArray = NDArray[np.float64]
@@ -48,7 +49,7 @@ def corner_points(triangles: FloatArray) -> FloatArray:
     Args:
         triangles: Corners [m], shape (n, 3, 3).
     """
-    return hull_corners(np.unique(triangles.reshape(-1, 3), axis=0))
+    return hull_corners(distinct(triangles.reshape(-1, 3))[0])
 
 
 def hull_corners(points: FloatArray) -> FloatArray:

@@ -52,10 +52,10 @@ class Candidates:
         self._weights = np.repeat([1.0, _INSIDE_WEIGHT], [len(pieces), len(inside)])
         seeds = np.concatenate([pieces.mean(axis=1), inside])
         self._boxes: list[tuple[FloatArray, FloatArray]] = []
-        covered = []
+        covered, within = [], solid.points(solid.outside <= protrusion)
         for R in orientations:
             drawn = seeds[rng.choice(len(seeds), _SEEDS)]
-            ends = boxes_in(solid, protrusion, R, drawn, rng)
+            ends = boxes_in(solid, protrusion, within, R, drawn, rng)
             self._boxes += [(R, box) for box in ends]
             covered.append(self._in_boxes(R, ends))
         tried = _CAPSULES if capsules else 0
@@ -166,7 +166,7 @@ def patches(
 def sample(pieces: FloatArray, length: float, rng: np.random.Generator) -> FloatArray:
     """Return at most a given number of pieces, evenly spread over the surface."""
     cells = np.floor(pieces.mean(axis=1) / (0.7 * length)).astype(np.int64)
-    chosen = np.unique(cells, axis=0, return_index=True)[1]
+    chosen = _one_of_each(cells)
     if len(chosen) > _CHOOSING:
         chosen = rng.choice(chosen, _CHOOSING, replace=False)
     return np.asarray(pieces[chosen])
@@ -175,4 +175,13 @@ def sample(pieces: FloatArray, length: float, rng: np.random.Generator) -> Float
 def thinned(points: FloatArray, spacing: float) -> FloatArray:
     """Return one point of each cell of a grid, shape (m, 3)."""
     cells = np.floor(points / spacing).astype(np.int64)
-    return np.asarray(points[np.unique(cells, axis=0, return_index=True)[1]])
+    return np.asarray(points[_one_of_each(cells)])
+
+
+def _one_of_each(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the first row of each cell, in the order of the cells, which have shape (n, 3)."""
+    if not len(cells):
+        return np.empty(0, np.int64)
+    cells = cells - cells.min(axis=0)
+    numbers = np.ravel_multi_index(tuple(cells.T), tuple(cells.max(axis=0) + 1))
+    return np.asarray(np.unique(numbers, return_index=True)[1])

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from tcs.model.robots.cutting import cut
+from tcs.model.robots.cutting import cut, distinct
 from tcs.model.robots.fitting.bounding import (
     best_candidate,
     enclose,
@@ -98,7 +98,7 @@ def fit_triangles(body: str, triangles: FloatArray, target: Target) -> Fit:
         triangles: Corners in its frame [m], shape (n, 3, 3).
         target: Closeness of the fit.
     """
-    corners = np.unique(triangles.reshape(-1, 3), axis=0)
+    corners, _ = distinct(triangles.reshape(-1, 3))
     points, hull = hull_corners(corners), hull_volume(triangles)
     tight = tightest_orientation(points)
     single = best_candidate(points, np.stack([tight, np.eye(3)]))

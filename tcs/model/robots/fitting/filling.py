@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from tcs.model.robots.cutting import distinct
 from tcs.model.robots.fitting.bounding import enclose
 from tcs.model.robots.fitting.growth import grown, sums_before
 from tcs.model.robots.primitives import Primitive
@@ -53,7 +54,7 @@ def _cells(triangles: FloatArray) -> tuple[FloatArray, NDArray[np.bool_], float]
     import trimesh
 
     pitch = float(np.ptp(triangles.reshape(-1, 3), axis=0).max()) / CELLS
-    corners, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    corners, index = distinct(triangles.reshape(-1, 3))
     mesh = trimesh.Trimesh(corners, index.reshape(-1, 3), process=False)
     voxels = mesh.voxelized(pitch)
     shell = np.asarray(voxels.matrix)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
+from scipy import ndimage, sparse
 
 from tcs.model.robots.fitting.bounding import hull_corners
-from tcs.model.robots.fitting.solid import Solid
+from tcs.model.robots.fitting.solid import Solid, distances
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -26,7 +26,12 @@ _DRAWN = 8
 
 
 def boxes_in(
-    solid: Solid, protrusion: float, R: FloatArray, seeds: FloatArray, rng: np.random.Generator
+    solid: Solid,
+    protrusion: float,
+    within: FloatArray,
+    R: FloatArray,
+    seeds: FloatArray,
+    rng: np.random.Generator,
 ) -> FloatArray:
     """Return boxes along given axes that reach no farther out of a solid than allowed.
 
@@ -35,6 +40,7 @@ def boxes_in(
     Args:
         solid: The solid.
         protrusion: Greatest distance of a point of a box from the solid [m].
+        within: The points of the grid that are no farther from the solid [m], shape (k, 3).
         R: Axes of the boxes as columns, shape (3, 3).
         seeds: Points to start from [m], shape (n, 3); those outside are left out.
         rng: Source of the orders.
@@ -42,24 +48,65 @@ def boxes_in(
     Returns:
         Least and greatest coordinates along the axes [m], shape (m, 2, 3).
     """
-    allowed = solid.outside <= protrusion
-    points = solid.points(allowed)
-    if len(points) > _SAMPLE:
-        points = points[rng.choice(len(points), _SAMPLE, replace=False)]
-    seen, border = hull_corners(points) @ R, _BORDER * solid.pitch
+    if len(within) > _SAMPLE:
+        within = within[rng.choice(len(within), _SAMPLE, replace=False)]
+    seen, border = hull_corners(within) @ R, _BORDER * solid.pitch
     low, high = seen.min(axis=0) - border, seen.max(axis=0) + border
     count = np.ceil((high - low) / solid.pitch).astype(np.int64) + 1
     # Sampling point k of the new grid is low @ R.T + pitch * R @ k, in cells of the solid's grid.
     start = (R @ low - solid.origin) / solid.pitch
-    outside = ndimage.affine_transform(
-        solid.outside, R, start, tuple(count), order=1, mode="nearest"
-    )
-    free = outside <= protrusion
+    free = _interpolated(solid.outside, R, start, tuple(count.tolist())) <= protrusion
     cells = np.clip(np.rint((seeds @ R - low) / solid.pitch).astype(np.int64), 0, count - 1)
     cells = cells[free[tuple(cells.T)]]
     boxes = grown(sums_before(~free), cells, rng)
     boxes = np.unique(boxes.reshape(-1, 6), axis=0).reshape(-1, 2, 3)
     return np.asarray(low + boxes * solid.pitch)
+
+
+def _interpolated(
+    values: NDArray[np.float32], R: FloatArray, start: FloatArray, count: tuple[int, ...]
+) -> NDArray[np.float32]:
+    """Return values of a grid at the points of another one, linear between its own.
+
+    Args:
+        values: The values; beyond the grid, those of its border hold.
+        R: Axes of the other grid, of the same pitch, as columns, shape (3, 3).
+        start: Its first point, in cells of the grid, shape (3,).
+        count: Its shape.
+    """
+    still = np.flatnonzero(np.diag(R) == 1.0)
+    if not len(still):
+        found = ndimage.affine_transform(values, R, start, count, order=1, mode="nearest")
+        return np.asarray(found)
+    # Turned about an axis of the grid, all planes across it are interpolated in the same way.
+    axis = int(still[0])
+    first, second = (k for k in range(3) if k != axis)
+    low, part = _between(start[axis] + np.arange(count[axis]), values.shape[axis])
+    planes = np.moveaxis(values, axis, 2)
+    along = planes[..., low] * (1.0 - part) + planes[..., low + 1] * part
+    i, j = np.indices((count[first], count[second])).reshape(2, -1)
+    u, of_u = _between(start[first] + R[first, first] * i + R[first, second] * j, len(planes))
+    across = planes.shape[1]
+    v, of_v = _between(start[second] + R[second, first] * i + R[second, second] * j, across)
+    corner = u * across + v
+    weights = np.stack(
+        [(1 - of_u) * (1 - of_v), (1 - of_u) * of_v, of_u * (1 - of_v), of_u * of_v], axis=1
+    )
+    columns = np.stack([corner, corner + 1, corner + across, corner + across + 1], axis=1)
+    rows = np.arange(0, 4 * len(i) + 1, 4)
+    matrix = sparse.csr_array(
+        (weights.ravel(), columns.ravel(), rows), shape=(len(i), len(planes) * across)
+    )
+    turned = (matrix @ along.reshape(-1, count[axis])).astype(np.float32)
+    shape = count[first], count[second], count[axis]
+    return np.moveaxis(turned.reshape(shape), 2, axis)
+
+
+def _between(at: FloatArray, count: int) -> tuple[IntArray, FloatArray]:
+    """Return the cell before each coordinate within a row of cells, and the part of the way on."""
+    at = at.clip(0.0, count - 1.0)
+    low = at.astype(np.int64).clip(0, count - 2)
+    return low, at - low
 
 
 def sums_before(cells: BoolArray) -> NDArray[np.int32]:
@@ -131,7 +178,7 @@ def capsules_in(
     Returns:
         Ends of the axes, shapes (n, 3), and radii, shape (n,) [m]; n is at most `count`.
     """
-    depth = ndimage.distance_transform_edt(solid.outside <= protrusion) * solid.pitch
+    depth = distances(solid.outside <= protrusion, solid.pitch)
     cells = np.argwhere(depth > 2 * solid.pitch)
     if not len(cells):
         return np.empty((0, 3)), np.empty((0, 3)), np.empty(0)

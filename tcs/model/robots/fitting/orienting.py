@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,13 +43,15 @@ def least_protruding(
         some = np.random.default_rng(0).choice(len(outside), _DRAWN, replace=False)
         outside, costs = outside[some], costs[some] * (len(outside) / _DRAWN)
 
+    # By coordinate: NumPy is slow along an axis of three.
+    own, apart = points.T.copy(), outside.T.copy()
+
     def cost(R: FloatArray) -> float:
-        seen, others = points @ R, outside @ R
-        low, high = seen.min(axis=0), seen.max(axis=0)
-        # By coordinate: NumPy is slow along an axis of three.
-        within = np.ones(len(others), np.bool_)
-        for k in range(3):
-            within &= (others[:, k] >= low[k]) & (others[:, k] <= high[k])
+        seen, others = R.T @ own, R.T @ apart
+        low, high = seen.min(axis=1), seen.max(axis=1)
+        within = np.ones(len(outside), np.bool_)
+        for at, least, greatest in zip(others, low, high, strict=True):
+            within &= (at >= least) & (at <= greatest)
         return float(costs[within].sum()) + per_volume * float((high - low).prod())
 
     best, least, step = R, cost(R), _FIRST
@@ -74,6 +77,15 @@ def _first_better(
 
 def _rotated(R: FloatArray, step: float) -> Iterator[FloatArray]:
     """Yield an orientation rotated about each of its axes, to both sides, by an angle [deg]."""
-    for axis in "xyz":
-        for angle in (step, -step):
-            yield R @ Rotation.from_euler(axis, angle, degrees=True).as_matrix()
+    for turn in _turns(step):
+        yield R @ turn
+
+
+@cache
+def _turns(step: float) -> tuple[FloatArray, ...]:
+    """Return rotations about each axis, to both sides, by an angle [deg]."""
+    return tuple(
+        Rotation.from_euler(axis, angle, degrees=True).as_matrix()
+        for axis in "xyz"
+        for angle in (step, -step)
+    )

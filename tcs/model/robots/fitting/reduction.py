@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.model.robots.fitting.bounding import enclose, hull_corners
+from tcs.model.robots.fitting.bounding import enclose
 from tcs.model.robots.primitives import Primitive
 
 FloatArray = NDArray[np.float64]
@@ -26,8 +26,12 @@ def contain(shapes: list[Primitive], pieces: FloatArray) -> BoolArray:
 def contained(shape: Primitive, pieces: FloatArray) -> BoolArray:
     """Return which pieces lie wholly in a shape, shape (n,)."""
     low, high = shape.bounds + np.array([[-_TOUCH], [_TOUCH]])
-    first = pieces[:, 0]
-    near = np.flatnonzero(((first >= low) & (first <= high)).all(axis=1))
+    is_near = np.ones(len(pieces), np.bool_)
+    # By coordinate: NumPy is slow along an axis of three.
+    for k in range(3):
+        first = pieces[:, 0, k]
+        is_near &= (first >= low[k]) & (first <= high[k])
+    near = np.flatnonzero(is_near)
     within = np.zeros(len(pieces), np.bool_)
     within[near] = shape.contains(pieces[near].reshape(-1, 3)).reshape(-1, 3).all(axis=1)
     return within
@@ -75,7 +79,7 @@ def reduced(
             continue
         current[k] = _around(body, shapes[k], points)
         if boxed and shapes[k].kind == "capsule":
-            box = enclose(body, np.unique(points, axis=0), "box", shapes[k].rotation)
+            box = enclose(body, points, "box", shapes[k].rotation)
             current[k] = min(current[k], box, key=lambda shape: shape.volume)
         within[k] = holds(current[k])
         count += within[k]
@@ -85,6 +89,6 @@ def reduced(
 def _around(body: str, shape: Primitive, points: FloatArray) -> Primitive:
     """Return a box reduced to points, or a capsule grown to contain them."""
     if shape.kind == "box":
-        return enclose(body, hull_corners(np.unique(points, axis=0)), "box", shape.rotation)
+        return enclose(body, points, "box", shape.rotation)
     beyond = float(shape.distance(points).max())
     return shape.shrunk(-np.ceil(beyond * 1e6 + 1) * 1e-6) if beyond > 0 else shape

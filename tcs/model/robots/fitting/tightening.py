@@ -8,10 +8,11 @@ from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
+from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from tcs.errors import RobotError, UnknownNameError
-from tcs.model.robots.cutting import cut, halved, longest_edges
+from tcs.model.robots.cutting import cut, distinct, halved, longest_edges
 from tcs.model.robots.fitting.bounding import (
     enclose,
     enclose_axis,
@@ -24,7 +25,7 @@ from tcs.model.robots.fitting.filling import fillers
 from tcs.model.robots.fitting.orienting import least_protruding
 from tcs.model.robots.fitting.reduction import contain, contained
 from tcs.model.robots.fitting.solid import CLOSING as USUAL_CLOSING
-from tcs.model.robots.fitting.solid import Solid, solid_of
+from tcs.model.robots.fitting.solid import Solid, measured, spaces_outside
 from tcs.model.robots.primitives import FINEST, Primitive
 from tcs.model.robots.robot_file import RobotFile
 
@@ -76,6 +77,7 @@ def tightened(
     splits: Mapping[str, int],
     spots: Mapping[str, Spots] = MappingProxyType({}),
     rounds: Mapping[str, Iterable[Primitive]] = MappingProxyType({}),
+    jobs: int = 1,
 ) -> tuple[Primitive, ...]:
     """Return primitives that enclose a robot, those of some bodies made tighter.
 
@@ -89,6 +91,7 @@ def tightened(
         splits: Largest number of shapes that are added, by body.
         spots: Where others pass a body closely: there its shapes become the closest.
         rounds: Shapes that are added before, by body, along parts that are round.
+        jobs: Number of processes, each of which tightens a body at a time.
 
     Raises:
         UnknownNameError: If a body has no primitive.
@@ -97,20 +100,28 @@ def tightened(
     found: dict[str, tuple[Primitive, ...]] = {}
     for shape in shapes:
         found[shape.body] = (*found.get(shape.body, ()), shape)
-    surfaces = surfaces_to_enclose(robot)
+    surfaces, tasks = surfaces_to_enclose(robot), []
     for body, most in splits.items():
         if body not in found or body not in surfaces:
             raise UnknownNameError("body", body, found, where=f"primitives '{robot.primitives}'")
-        triangles = surfaces[body][2]
         given = (*found[body], *rounds.get(body, ()))
-        tightening = Tightening(body, given, triangles, spots.get(body, ()))
-        tightening.reduce()
-        tightening.split(most)
-        # What shapes leave each other has changed.
-        tightening.reduce()
-        tight = tightening.shapes
-        found[body] = (*tight, *fillers(body, tight, triangles))
+        tasks.append((body, given, surfaces[body][2], spots.get(body, ()), most))
+    tight = Parallel(jobs)(delayed(_tightened_body)(*task) for task in tasks)
+    found |= dict(zip(splits, tight, strict=True))
     return tuple(shape for fitted in found.values() for shape in fitted)
+
+
+def _tightened_body(
+    body: str, shapes: Iterable[Primitive], triangles: FloatArray, spots: Spots, most: int
+) -> tuple[Primitive, ...]:
+    """Return the shapes of one body made tighter, up to `most` of them split in two."""
+    tightening = Tightening(body, shapes, triangles, spots)
+    tightening.reduce()
+    tightening.split(most)
+    # What shapes leave each other has changed.
+    tightening.reduce()
+    tight = tightening.shapes
+    return (*tight, *fillers(body, tight, triangles))
 
 
 class Tightening:
@@ -138,7 +149,7 @@ class Tightening:
         self._solid, inside = _measured(triangles, pitch, reach)
         self._worth = _worth(self._solid, spots)
         self._pieces = _pieces_in(self._shapes, triangles, max(PIECE, 2 * pitch))
-        points, index = np.unique(self._pieces.reshape(-1, 3), axis=0, return_inverse=True)
+        points, index = distinct(self._pieces.reshape(-1, 3))
         self._corners, self._index = points, index.reshape(-1, 3)
         self._inside = inside[np.any([s.contains(inside) for s in self._shapes], axis=0)]
         self._within = [self._contained(shape) for shape in self._shapes]
@@ -340,9 +351,11 @@ def _measured(triangles: FloatArray, pitch: float, reach: float) -> tuple[Solid,
     """
     extent = float(np.ptp(triangles, axis=(0, 1)).max())
     closing = max(CLOSING, _CLOSING_CELLS * pitch)
-    solid = solid_of(triangles, pitch, reach, closing)
+    balls = (closing, reach), (max(USUAL_CLOSING, extent / SPACINGS), 0.0)
+    solid, wide = (
+        measured(empty, origin, pitch) for empty, origin in spaces_outside(triangles, pitch, balls)
+    )
     # The inside of a cover with openings that only the smaller ball enters.
-    wide = solid_of(triangles, pitch, 0.0, max(USUAL_CLOSING, extent / SPACINGS))
     deep = wide.points(wide.depth > DEEP)
     cells = np.rint((deep - solid.origin) / pitch).astype(np.int64)
     outside = solid.outside.copy()

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from tcs.model.robots.self_collision.blocked import Blocked, blocked_by_shapes
 from tcs.model.robots.self_collision.blocked_at_boxes import blocked_at_boxes
+from tcs.model.robots.self_collision.clearance import SurfaceDistance, carried_surfaces
 from tcs.model.robots.self_collision.disabled_pairs import (
     propose_disabled_pairs,
     renewed_groups,
@@ -22,8 +23,10 @@ __all__ = [
     "Blocked",
     "BodyPair",
     "SelfCollision",
+    "SurfaceDistance",
     "blocked_at_boxes",
     "blocked_by_shapes",
+    "carried_surfaces",
     "free_posture",
     "propose_disabled_pairs",
     "renewed_groups",

@@ -14,7 +14,7 @@ from tcs.model.robots.robot_file import RobotFile
 from tcs.model.robots.self_collision.clearance import (
     SPACING,
     SurfaceDistance,
-    carried_triangles,
+    carried_surfaces,
 )
 from tcs.model.robots.self_collision.plant import BodyPair, SelfCollision
 from tcs.model.robots.self_collision.postures import sample_positions
@@ -69,7 +69,13 @@ class Blocked:
         return f"{found}: {worst}" if worst else found
 
 
-def blocked_by_shapes(robot: RobotFile, *, postures: int = 300, seed: int = 0) -> Blocked:
+def blocked_by_shapes(
+    robot: RobotFile,
+    *,
+    postures: int = 300,
+    seed: int = 0,
+    surfaces: SurfaceDistance | None = None,
+) -> Blocked:
     """Return how many postures the shapes block although the surfaces are free of contact.
 
     Arm and torso are drawn within the joint limits, everything else keeps its posture. Shapes
@@ -82,13 +88,13 @@ def blocked_by_shapes(robot: RobotFile, *, postures: int = 300, seed: int = 0) -
         robot: The robot.
         postures: Number of random postures.
         seed: Seed of the draws.
+        surfaces: Its surfaces, as of `carried_surfaces`, if they are known.
 
     Raises:
         RobotError: If the robot's model cannot be used.
     """
     model = model_with_extras(robot)
-    triangles = carried_triangles(robot, model)
-    surfaces = SurfaceDistance(model, triangles)
+    surfaces = surfaces or carried_surfaces(robot)
     limits, off = robot.joint_limits(), {frozenset(pair) for pair in robot.disabled_pairs}
     narrowed = {frozenset(p) for g in robot.disabled_groups if g.ranges for p in g.pairs}
     plant = SelfCollision(robot)

@@ -19,7 +19,7 @@ from tcs.model.robots.self_collision.blocked import Blocked, drawn_positions, ra
 from tcs.model.robots.self_collision.clearance import (
     SPACING,
     SurfaceDistance,
-    carried_triangles,
+    carried_surfaces,
 )
 from tcs.model.robots.self_collision.plant import BodyPair
 from tcs.model.robots.urdf.pose import pose_in_root
@@ -40,7 +40,13 @@ _FACTORS = {"sphere": (1.0, 1.0, 1.0), "capsule": (1.0, 0.5, 1.0), "box": (0.5, 
 """The kernel's half sizes over the sizes of a primitive."""
 
 
-def blocked_at_boxes(robot: RobotFile, *, postures: int = 300, seed: int = 0) -> Blocked:
+def blocked_at_boxes(
+    robot: RobotFile,
+    *,
+    postures: int = 300,
+    seed: int = 0,
+    surfaces: SurfaceDistance | None = None,
+) -> Blocked:
     """Return how many postures the arm's shapes block at random boxes that its surface clears.
 
     Three boxes with edges of 2 to 40 cm are anywhere within reach of the arm, others in each
@@ -51,16 +57,18 @@ def blocked_at_boxes(robot: RobotFile, *, postures: int = 300, seed: int = 0) ->
         robot: The robot.
         postures: Number of random postures.
         seed: Seed of the draws.
+        surfaces: Its surfaces, as of `carried_surfaces`, if they are known.
 
     Raises:
         RobotError: If the robot's model cannot be used.
     """
     model = model_with_extras(robot)
-    surfaces = SurfaceDistance(model, carried_triangles(robot, model))
+    surfaces = surfaces or carried_surfaces(robot)
     moved = model.links_moved_by(robot.arm_joints[0])
+    primitives = robot.load_primitives()
     shapes = {
-        body: packed([shape for shape in robot.load_primitives() if shape.body == body])
-        for body in {shape.body for shape in robot.load_primitives()} & moved
+        body: packed([shape for shape in primitives if shape.body == body])
+        for body in {shape.body for shape in primitives} & moved
         if surfaces.has(body)
     }
     first, last = (model.joints[robot.arm_joints[i]].child for i in (0, -1))

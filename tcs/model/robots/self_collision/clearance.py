@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial import cKDTree
 
+from tcs.model.robots.cutting import distinct
+from tcs.model.robots.extras import model_with_extras
 from tcs.model.robots.fitting.enclosure import surfaces_to_enclose
 from tcs.model.robots.robot_file import RobotFile
 from tcs.model.robots.self_collision.plant import BodyPair
@@ -140,7 +142,8 @@ class SurfaceDistance:
         # The body with more points goes into the tree, those of the other are queries.
         many, few = sorted(pair, key=lambda body: -len(self.points(body)))
         if many not in self._trees:
-            self._trees[many] = cKDTree(self.points(many))
+            # Balanced ones take several times as long to build, and as long to ask.
+            self._trees[many] = cKDTree(self.points(many), balanced_tree=False, compact_nodes=False)
         tree = self._trees[many]
         R_AB, p_AB = _relative_pose(self._model, (many, few), positions)
         if few not in self._blocks:
@@ -160,9 +163,19 @@ class SurfaceDistance:
             # Reflect the half of the unit square beyond its diagonal onto the triangle.
             uv = np.where(uv.sum(axis=1, keepdims=True) > 1, 1 - uv, uv)
             inner = triangles[chosen, 0] + np.einsum("ni,nij->nj", uv, edges[chosen])
-            corners = np.unique(triangles.reshape(-1, 3), axis=0)
+            corners, _ = distinct(triangles.reshape(-1, 3))
             self._points[body] = np.concatenate([inner, corners])
         return self._points[body]
+
+
+def carried_surfaces(robot: RobotFile) -> SurfaceDistance:
+    """Return the surfaces that the primitives of a robot enclose, at the usual scale.
+
+    Raises:
+        RobotError: If the robot's model cannot be used.
+    """
+    model = model_with_extras(robot)
+    return SurfaceDistance(model, carried_triangles(robot, model))
 
 
 def carried_triangles(robot: RobotFile, model: Urdf) -> dict[str, FloatArray]:
@@ -177,7 +190,11 @@ def carried_triangles(robot: RobotFile, model: Urdf) -> dict[str, FloatArray]:
 
 def joints_between(model: Urdf, first: str, second: str) -> tuple[Joint, ...]:
     """Return the movable joints between one body and another."""
-    up, down = (_movable_above(model, body) for body in (first, second))
+    return differing(movable_above(model, first), movable_above(model, second))
+
+
+def differing(up: Sequence[Joint], down: Sequence[Joint]) -> tuple[Joint, ...]:
+    """Return the joints that move one of two bodies, given those that move each of them."""
     shared = {joint.name for joint in up} & {joint.name for joint in down}
     return tuple(joint for joint in (*up, *down) if joint.name not in shared)
 
@@ -192,7 +209,8 @@ def free_joints(model: Urdf, joints: Iterable[Joint]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
-def _movable_above(model: Urdf, body: str) -> list[Joint]:
+def movable_above(model: Urdf, body: str) -> list[Joint]:
+    """Return the movable joints above a body, the nearest first."""
     joints = []
     while (top := welded_top(model, body)[0]) in model.parent_joints:
         joints.append(model.parent_joints[top])

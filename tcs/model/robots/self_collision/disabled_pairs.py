@@ -16,8 +16,10 @@ from tcs.model.robots.self_collision.clearance import (
     MEETING,
     SurfaceDistance,
     carried_triangles,
+    differing,
     free_joints,
     joints_between,
+    movable_above,
 )
 from tcs.model.robots.self_collision.plant import BodyPair, SelfCollision
 from tcs.model.robots.self_collision.postures import sample_positions
@@ -61,7 +63,7 @@ def propose_disabled_pairs(
     moved, hand = (model.links_moved_by(robot.arm_joints[i]) for i in (0, -1))
     neighbours = neighbouring_pairs(robot)
     touched, always = touching_pairs(
-        robot, moved, neighbours, sample_positions(hard, postures, seed)
+        robot, moved, neighbours, sample_positions(hard, postures, seed), _distant_pairs(robot)
     )
     triangles = carried_triangles(robot, model)
     surfaces = SurfaceDistance(model, triangles)
@@ -97,8 +99,21 @@ def neighbouring_pairs(robot: RobotFile) -> set[BodyPair]:
     """Return the pairs of links of the URDF that one joint connects, each sorted by name."""
     model = robot.model()
     bodies = sorted({shape.body for shape in robot.load_primitives()} & model.links.keys())
+    above = {body: movable_above(model, body) for body in bodies}
     pairs = itertools.combinations(bodies, 2)
-    return {pair for pair in pairs if len(joints_between(model, *pair)) == 1}
+    return {(a, b) for a, b in pairs if len(differing(above[a], above[b])) == 1}
+
+
+def _distant_pairs(robot: RobotFile) -> frozenset[BodyPair]:
+    """Return the pairs of bodies whose closest approach is not searched, each sorted by name."""
+    model = model_with_extras(robot)
+    bodies = sorted({shape.body for shape in robot.load_primitives()})
+    above = {body: movable_above(model, body) for body in bodies}
+    return frozenset(
+        (a, b)
+        for a, b in itertools.combinations(bodies, 2)
+        if len(free_joints(model, differing(above[a], above[b]))) > _MOST_JOINTS
+    )
 
 
 def touching_pairs(
@@ -106,10 +121,17 @@ def touching_pairs(
     moved: frozenset[str],
     neighbours: set[BodyPair],
     postures: list[dict[str, float]],
+    distant: frozenset[BodyPair] = frozenset(),
 ) -> tuple[set[BodyPair], set[BodyPair]]:
     """Return the pairs with a moved body that touch in any posture, and those that do in all.
 
-    The latter lack neighbours.
+    Args:
+        robot: The robot.
+        moved: The bodies that the scored arm moves.
+        neighbours: Pairs that are left out of those that touch in all postures.
+        postures: Positions by joint [rad or m].
+        distant: Pairs that may be left out of those that touch in any posture, unless they do in
+            all.
     """
     plant = SelfCollision(robot)
     plant.ignore_within(plant.bodies - moved)
@@ -117,10 +139,17 @@ def touching_pairs(
     always: set[BodyPair] | None = None
     for posture in postures:
         now = plant.touching(posture)
+        if lost := (always or set()) - now:
+            plant.compare(lost)
+            now |= plant.touching(posture) & lost
         still = (now if always is None else always & now) - neighbours
+        # Of a pair that may always touch, one contact tells that it does here. Many shapes of some
+        # do: they would take most of the time.
+        plant.follow(still if always is None else still & lost)
         # Nothing more is to be learned of neighbours, and of a pair that touches only here or
-        # only before. Their contacts would take most of the time.
-        plant.ignore((now | (always or set())) - still)
+        # only before.
+        settled = (now | (always or set())) - still
+        plant.ignore(settled if always is not None else settled | (distant - still))
         touched |= now
         always = set(still)
     return touched, always or set()

@@ -16,6 +16,7 @@ from pydrake.geometry import (
     Cylinder,
     GeometryId,
     GeometrySet,
+    PenetrationAsPointPair,
     ProximityProperties,
     Shape,
     Sphere,
@@ -67,9 +68,14 @@ class SelfCollision:
                 add.primitive(primitive if hulls else primitive.shrunk(-robot.self_margin / 2))
         plant.Finalize()
         self._bodies = add.bodies
+        self._of_body: dict[str, list[GeometryId]] = {}
+        for geometry, body in add.bodies.items():
+            self._of_body.setdefault(body, []).append(geometry)
         _compare_unwelded(scene_graph.collision_filter_manager(), self._bodies, robot)
         joints = (plant.get_joint(index) for index in plant.GetJointIndices())
         self._starts = {j.name(): j.position_start() for j in joints if j.num_positions() == 1}
+        self._deepest: dict[BodyPair, PenetrationAsPointPair] = {}
+        self._followed: dict[BodyPair, list[tuple[GeometryId, GeometryId]]] = {}
         self._plant = plant
         self._diagram = builder.Build()
         self._context = self._diagram.CreateDefaultContext()
@@ -93,8 +99,32 @@ class SelfCollision:
         for name, value in positions.items():
             q[self._starts[name]] = value
         self._plant.SetPositions(self._state, q)
-        contacts = self._query_port.Eval(self._query_context).ComputePointPairPenetration()
-        return frozenset(_pair(self._bodies[c.id_A], self._bodies[c.id_B]) for c in contacts)
+        self._deepest = {}
+        for contact in self._query_port.Eval(self._query_context).ComputePointPairPenetration():
+            pair = _pair(self._bodies[contact.id_A], self._bodies[contact.id_B])
+            known = self._deepest.get(pair)
+            if known is None or contact.depth > known.depth:
+                self._deepest[pair] = contact
+        return frozenset(self._deepest)
+
+    def follow(self, pairs: Iterable[BodyPair]) -> None:
+        """Compare only shapes of pairs that overlapped most, now or when followed before."""
+        pairs = tuple(pairs)
+        self.ignore(pairs)
+        declaration = CollisionFilterDeclaration()
+        for pair in pairs:
+            contact = self._deepest[pair]
+            self._followed.setdefault(pair, []).append((contact.id_A, contact.id_B))
+            for first, second in self._followed[pair]:
+                declaration.AllowBetween(GeometrySet(first), GeometrySet(second))
+        self._filter.Apply(declaration)
+
+    def compare(self, pairs: Iterable[BodyPair]) -> None:
+        """Compare all shapes of pairs of bodies that were left out or followed."""
+        declaration = CollisionFilterDeclaration()
+        for first, second in pairs:
+            declaration.AllowBetween(self._geometries(first), self._geometries(second))
+        self._filter.Apply(declaration)
 
     def ignore(self, pairs: Iterable[BodyPair]) -> None:
         """Leave out pairs of bodies from now on: those that always touch take most time."""
@@ -125,7 +155,7 @@ class SelfCollision:
         return frozenset(self._bodies.values())
 
     def _geometries(self, *bodies: str) -> GeometrySet:
-        return GeometrySet([g for g, body in self._bodies.items() if body in bodies])
+        return GeometrySet([g for body in bodies for g in self._of_body.get(body, ())])
 
 
 class _Adder:

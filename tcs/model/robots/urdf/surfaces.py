@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from tcs.errors import RobotError
 from tcs.files.quantities import SIZE
+from tcs.model.robots.cutting import distinct
 from tcs.model.robots.urdf.meshes import mesh_triangles
 from tcs.model.robots.urdf.model import Geometry, Urdf, Vector
 
@@ -40,14 +42,20 @@ def body_triangles(model: Urdf) -> dict[str, FloatArray]:
     """
     found = {}
     for body in model.links:
-        pieces = [
-            place(geometry_triangles(geometry), geometry.xyz, geometry.rpy)
-            for geometry in surface_geometries(model, body)
-        ]
-        if pieces:
-            # One mesh often is both visual and collision geometry.
-            found[body] = np.unique(np.concatenate(pieces), axis=0)
+        geometries = surface_geometries(model, body)
+        if geometries:
+            found[body] = _placed_triangles(geometries)
     return found
+
+
+@cache
+def _placed_triangles(geometries: tuple[Geometry, ...]) -> FloatArray:
+    """Return the triangles of the geometries of a body in its frame [m], shape (n, 3, 3)."""
+    pieces = [place(geometry_triangles(g), g.xyz, g.rpy) for g in geometries]
+    # One mesh often is both visual and collision geometry.
+    corners, _ = distinct(np.concatenate(pieces).reshape(-1, 9))
+    corners.setflags(write=False)
+    return corners.reshape(-1, 3, 3)
 
 
 def surface_geometries(model: Urdf, body: str) -> tuple[Geometry, ...]:

@@ -12,6 +12,7 @@ from tcs.model.robots.fitting import tightening as module
 from tcs.model.robots.fitting.bounding import corner_points, enclose, enclose_axis
 from tcs.model.robots.fitting.tightening import Tightening, tightened
 from tcs.model.robots.primitives import enclosed, read_primitives, union_volume
+from tcs.model.robots.urdf.surfaces import body_triangles
 
 
 @pytest.fixture(autouse=True)
@@ -188,10 +189,13 @@ def test_shapes_that_leave_surface_bare_are_refused(steps, wide):
 
 def test_other_bodies_keep_their_shapes(pr2):
     before = read_primitives(Path(pr2.primitives))
-    name = "l_gripper_l_finger_tip_link"
-    after = tightened(pr2, before, {name: 3})
-    assert [s for s in after if s.body != name] == [s for s in before if s.body != name]
-    own = [s for s in before if s.body == name]
-    assert union_volume(s for s in after if s.body == name) < union_volume(own)
+    names = {"l_gripper_l_finger_tip_link": 3, "l_gripper_r_finger_tip_link": 1}
+    after = tightened(pr2, before, names, jobs=2)
+    assert [s for s in after if s.body not in names] == [s for s in before if s.body not in names]
+    surfaces = body_triangles(pr2.model())
+    for name in names:
+        own, tight = ([s for s in shapes if s.body == name] for shapes in (before, after))
+        assert union_volume(tight) < union_volume(own)
+        assert enclosed(tight, surfaces[name]).all()
     with pytest.raises(UnknownNameError, match="Did you mean 'l_forearm_link'"):
         tightened(pr2, before, {"l_forearm_lin": 3})
