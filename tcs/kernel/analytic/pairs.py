@@ -24,7 +24,7 @@ from tcs.kernel.analytic.search import find_candidates, record_all
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, int_constant
 from tcs.kernel.contacts import NO_CONTACT, Workspace, arm_contact, at_goal
-from tcs.kernel.dexterity import ISOTROPY, UNLIMITED
+from tcs.kernel.dexterity import ANY, ISOTROPY, UNLIMITED
 from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.problem import Problem
 from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED, TOO_FAR
@@ -45,8 +45,12 @@ power here, and rounding joints to float32 costs up to 1e-7."""
 
 @inner
 def samples_hold_measure(problem: Problem) -> bool:
-    """Return whether isotropy, which `solve_samples` computes, is the measure to maximise."""
-    return problem.measure.of == ISOTROPY and problem.measure.penalty == UNLIMITED
+    """Return whether isotropy, which `solve_samples` computes, is the measure to maximise.
+
+    If any solution will do, isotropy puts the samples in order.
+    """
+    of = problem.measure.of
+    return (of == ISOTROPY or of == ANY) and problem.measure.penalty == UNLIMITED
 
 
 @inner
@@ -207,6 +211,10 @@ def score_pair(
     winner, contact, value = NOTHING, NO_CONTACT, -1.0
     if found:
         winner, contact = best_free(problem, work, body_A, search, NONE, found, -1.0)
+    if winner >= 0 and problem.measure.of == ANY:
+        for k in range(7):
+            search.best[k] = search.q[k]
+        return REACHED, NO_CONTACT
     if winner >= 0:
         value = refine(problem, work, body_A, search, winner, REFINEMENTS, -1.0)
     exceeded = -1.0

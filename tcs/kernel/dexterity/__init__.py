@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 from tcs.errors import UnknownNameError
 
-ISOTROPY, INVERSE_CONDITION, LIMIT_WEIGHTED = 0, 1, 2
+ISOTROPY, INVERSE_CONDITION, LIMIT_WEIGHTED, ANY = 0, 1, 2, 3
 """Function of the Jacobian; LIMIT_WEIGHTED is the isotropy with the joints weighted by their
-distance to their limits."""
+distance to their limits, ANY that of some solution: the search ends at the first one."""
 UNLIMITED, NORMALISED, THESIS = 0, 1, 2
 """Joint-limit penalty: none, normalised, or as in the ITCM thesis."""
 
@@ -21,11 +21,13 @@ class Dexterity(NamedTuple):
     """A dexterity measure, as the codes that the compiled functions use."""
 
     of: int
-    """ISOTROPY, INVERSE_CONDITION or LIMIT_WEIGHTED."""
+    """ISOTROPY, INVERSE_CONDITION, LIMIT_WEIGHTED or ANY."""
     penalty: int
     """UNLIMITED, NORMALISED or THESIS."""
 
 
+ANY_SOLUTION = Dexterity(ANY, UNLIMITED)
+"""In place of a measure where only the reason of each pair counts."""
 DEFAULT_MEASURE = "isotropy"
 MEASURES = {
     DEFAULT_MEASURE: Dexterity(ISOTROPY, UNLIMITED),

@@ -80,8 +80,8 @@ class PerturbedPoints:
         ]
 
         def fill(part: _Part) -> None:
-            found = part.scenes.scores(part.poses, part.run)
-            out[part.row, part.run.start : part.run.stop] = found.reason
+            found = part.scenes.reasons(part.poses, part.run)
+            out[part.row, part.run.start : part.run.stop] = found
 
         Parallel(n_jobs=self.jobs, prefer="threads")(delayed(fill)(part) for part in parts)
         return out

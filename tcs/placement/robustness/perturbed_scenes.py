@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tcs.errors import TcsError
 from tcs.kernel.arrays import FloatArray, IntArray
+from tcs.kernel.dexterity import ANY_SOLUTION
 from tcs.kernel.problem import Problem
 from tcs.kernel.scores import Scores
 from tcs.kernel.sweep import score_slice
@@ -81,6 +82,14 @@ class PerturbedScenes(NamedTuple):
         score_slice(problem, self.grippers, run.start, run.stop, scores)
         return scores
 
+    def reasons(self, poses: BasePoses, run: Run) -> NDArray[np.uint8]:
+        """Return the reason of each sample and goal of one run, shape (stop - start, goals).
+
+        They are those of `scores`, whose search goes on for the best solution.
+        """
+        problem = self.problem._replace(measure=ANY_SOLUTION)
+        return self._replace(problem=problem).scores(poses, run).reason
+
     def reached(
         self, poses: BasePoses, runs: list[Run], jobs: int
     ) -> Iterator[tuple[Run, NDArray[np.bool_]]]:
@@ -105,4 +114,4 @@ class PerturbedScenes(NamedTuple):
             yield from zip(batch, found, strict=True)
 
     def _reached(self, poses: BasePoses, runs: list[Run]) -> list[NDArray[np.bool_]]:
-        return [self.scores(poses, run).reason == Reason.REACHED for run in runs]
+        return [self.reasons(poses, run) == Reason.REACHED for run in runs]

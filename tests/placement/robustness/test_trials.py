@@ -26,11 +26,11 @@ from tcs.model.scene import (
     goal_poses,
 )
 from tcs.model.scene.contacts import Group
-from tcs.placement.robustness import Trials, perturbed_scenes
+from tcs.placement.robustness import PerturbedPoints, Trials, perturbed_scenes
 from tcs.placement.robustness import trials as trials_module
 from tcs.placement.robustness.body_collisions import BODY_COLLISIONS, base_bodies, counted_pairs
 from tcs.placement.scoring.drake_check import CLEARANCE_ROUNDING, POSITION_BAR, ROTATION_BAR
-from tcs.placement.tables import Reason
+from tcs.placement.tables import Points, Reason
 from tests.kernel.judge import is_true
 
 
@@ -106,6 +106,18 @@ def test_results_do_not_depend_on_threads_or_batches(trials, rng, monkeypatch):
     monkeypatch.setattr(perturbed_scenes, "BATCH", 3)
     assert np.array_equal(trials.reached(members, offsets), found)
     assert np.array_equal(trials.reached(members[::-1], offsets)[::-1], found)
+
+
+def test_the_first_solution_gives_the_reasons_that_the_best_gives(trials, rng):
+    members, offsets = some(rng, trials, 12), trials.errors.draw(20, 0)
+    at = trials.grid.values(members)
+    points = Points(np.stack([*at.values()], axis=1), np.zeros(len(members), dtype=np.int64))
+    found = PerturbedPoints(trials, offsets, 1).reasons(points)
+    best = np.array([trials.outcome(int(member), offsets).reason for member in members])
+    assert np.array_equal(found, best)
+    assert np.unique(best).size > 2
+    reached = trials.reached(members, offsets, jobs=1)
+    assert np.array_equal(reached, best == Reason.REACHED)
 
 
 def test_configurations_on_their_own_samples_are_the_diagonal(trials, rng):
