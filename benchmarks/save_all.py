@@ -59,6 +59,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "optimum": (),
     "surest_search": (),
     "surest_rules": (),
+    "surest_exact": (),
     "toc": (),
     "placing": (),
     "obstacles": (),

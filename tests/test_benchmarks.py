@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -279,3 +280,51 @@ def test_faults_are_told_apart(module, found, fault):
     faults = module("faults")
     counted = {name for name, count in faults.judged(found, [1.0], 2).items() if count}
     assert counted == ({fault} if fault else set())
+
+
+class MadeRow:
+    """Configurations along a line, with goals that each reaches in samples as a table says."""
+
+    goals = 3
+
+    def __init__(self, exact, table, order, apart):
+        self.exact, self.table, self.order = exact, table, order
+        self.samples = self
+        self.file = SimpleNamespace(
+            nominal=SimpleNamespace(sets=SimpleNamespace(min_distance=apart))
+        )
+
+    def contenders(self):
+        flat = np.arange(len(self.table)) + 100
+        xy = np.stack([0.1 * np.arange(flat.size), np.zeros(flat.size)], axis=1)
+        return self.exact.Contenders(flat, xy, np.zeros((flat.size, 0), np.uint64))
+
+    def reached(self, flat, which):
+        yield self.table[flat - 100][:, which]
+
+
+@pytest.mark.parametrize("apart", [0.0, 1.55])
+@pytest.mark.parametrize("alone", [False, True])
+def test_the_surest_pair_loses_no_more_than_any(module, monkeypatch, rng, apart, alone):
+    exact = module("surest_exact")
+    # With few guesses the first pairs are not the best.
+    monkeypatch.setattr(exact, "GUESSES", 2)
+    monkeypatch.setattr(exact, "SCREENED", 2)
+    monkeypatch.setattr(exact, "TRIED", 1)
+    often = rng.uniform(0.6, 0.9, size=(40, 1, 1))
+    table = rng.uniform(size=(40, 300, 3)) < often
+    # Two that complement each other and have nothing in common, and one that does so from too near.
+    table[5] = rng.uniform(size=(300, 3)) < 0.5
+    table[30] = ~table[5] & (rng.uniform(size=(300, 3)) < 0.99)
+    table[9] = ~table[5]
+    if alone:
+        table[11] = True
+    row = MadeRow(exact, table, rng.permutation(300), apart)
+    found = exact.surest_pair(row)
+    lost = {
+        (i, j): np.count_nonzero(~(table[i] | table[j]))
+        for i in range(40)
+        for j in range(i, 40)
+        if i == j or 0.1 * (j - i) >= apart - 1e-9
+    }
+    assert lost[tuple(sorted((found - 100).tolist()))] == min(lost.values())
