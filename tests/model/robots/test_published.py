@@ -313,10 +313,13 @@ def test_shoulder_and_upper_arm_cross_only_beyond_the_range_of_the_lift(name, si
     lift, roll = f"{side}_shoulder_lift_joint", f"{side}_upper_arm_roll_joint"
     assert robot.joint_limits() == robot.without_ranges.joint_limits()  # the soft limits
     limits = robot.with_choices(limits="hard").joint_limits()
-    rolls = np.linspace(*limits[roll], 9)
-    clear, beyond = (
+    rolls, lifts = np.linspace(*limits[roll], 9), np.linspace(*limits[lift], 5)
+    clear = [{lift: angle, roll: q} for angle in lifts for q in rolls]
+    assert mesh_distances(robot, pair, clear).min() > robot.self_margin
+    # The widest range to two thousandths of a radian.
+    close, beyond = (
         mesh_distances(robot, pair, [{lift: angle, roll: q} for q in rolls])
-        for angle in (limits[lift][1], 1.36)
+        for angle in (limits[lift][1] + 0.002, 1.36)
     )
-    assert clear.min() > 0.0015
+    assert close.max() < robot.self_margin
     assert beyond.max() <= 0.0
