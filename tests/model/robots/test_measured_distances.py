@@ -143,6 +143,20 @@ def test_crossing_surfaces_have_no_distance(rng):
         assert surface_distance(first, second, 0.1) == 0.0
 
 
+def test_a_surface_within_another_has_no_distance(rng):
+    """Its triangles cross none, but the body is inside the other one."""
+    R = Rotation.random(rng=rng).as_matrix()
+    outer, inner = box(0.3, 0.2, 0.2) @ R.T, box(0.02, 0.03, 0.01)
+    assert surface_distance(outer, inner, 0.1) == surface_distance(inner, outer, 0.1) == 0.0
+    # Beside a corner: within the box around the tilted one, outside its hull.
+    corner = outer.reshape(-1, 3)[0]
+    beside = inner * 0.1 + corner + 0.01 * corner / np.linalg.norm(corner)
+    assert 0.0 < surface_distance(outer, beside, 0.1) < 0.011
+    # A flat surface has no inside.
+    plate = np.array([[[-1.0, -1, 0], [1, -1, 0], [0, 1, 0]]])
+    assert surface_distance(plate, inner + np.array([0, 0, 0.02]), 0.1) == pytest.approx(0.015)
+
+
 def boxes_on_two_joints():
     """Return a small box that turns about itself, beside a larger one that it goes around."""
     sizes, centres = ((0.1, 0.1, 0.1), (0.04, 0.04, 0.04)), (0.0, 0.085)

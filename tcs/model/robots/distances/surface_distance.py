@@ -9,6 +9,7 @@ import itertools
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
 
 FloatArray = NDArray[np.float64]
 
@@ -19,11 +20,16 @@ _CHUNK = 200_000
 def surface_distance(first: FloatArray, second: FloatArray, farthest: float) -> float:
     """Return the distance of two surfaces [m], 0 where they cross, at most `farthest`.
 
+    It is 0 too where one is within the convex hull of the other: triangles of a body inside another
+    one are apart.
+
     Args:
         first: Triangles [m], shape (n, 3, 3).
         second: Triangles in the same frame [m], shape (m, 3, 3).
         farthest: Distance beyond which nothing is compared [m].
     """
+    if _is_within(first, second) or _is_within(second, first):
+        return 0.0
     for _ in range(2):
         first = _near(first, second, farthest)
         second = _near(second, first, farthest)
@@ -41,6 +47,22 @@ def surface_distance(first: FloatArray, second: FloatArray, farthest: float) -> 
         if len(i):
             least = min(least, float(_distances(some[i], second[j]).min()))
     return least
+
+
+def _is_within(triangles: FloatArray, others: FloatArray) -> bool:
+    """Return whether all triangles are within the convex hull of others."""
+    if not (len(triangles) and len(others)):
+        return False
+    points, around = triangles.reshape(-1, 3), others.reshape(-1, 3)
+    # Hardly ever even within the box around them.
+    low, high = around.min(axis=0), around.max(axis=0)
+    if not ((points >= low) & (points <= high)).all():
+        return False
+    try:
+        faces = ConvexHull(around).equations
+    except QhullError:
+        return False
+    return bool((points @ faces[:, :3].T + faces[:, 3] <= 0.0).all())
 
 
 def _near(triangles: FloatArray, others: FloatArray, distance: float) -> FloatArray:
