@@ -25,6 +25,7 @@ from tcs.kernel.motion.straight import (
     take_piece,
     take_pieces,
 )
+from tcs.kernel.motion.tool_line import take_line
 from tcs.kernel.numeric.newton import factorise, step_to_goal
 
 FIRST = int_constant(0)
@@ -133,19 +134,30 @@ def fill_spline(
                 tangents[n, k] = curve.slopes[n, k]
         keep_within_limits(scene, points, tangents)
         curve.pieces[0] = pieces
-        error = 0.0
+        error = off = turned = 0.0
         for n in range(pieces):
             take_piece(motion, points, tangents, n)
             error = error_between(scene, motion, curve.line, offset, (n + 0.5) / pieces)
             if error > OFF_LINE:
                 break
+            at_middle = curve.line.newton.error
+            turned = max(turned, _length(at_middle[:3]))
+            off = max(off, _length(at_middle[3:]))
         if error <= OFF_LINE:
+            slopes = curve.slopes[: pieces + 1]
+            take_line(scene, motion, offset, points, tangents, slopes, off, turned)
             return True
         if pieces == MOST:
             return False
         known = 4 if error > FAR_OFF * OFF_LINE and 4 * pieces <= MOST else 2
         pieces *= known
         _spread_points(curve, pieces, known)
+
+
+@inner
+def _length(vector: FloatArray) -> float:
+    """Return the length of a vector, shape (3,)."""
+    return np.sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
 
 
 @inner
@@ -201,7 +213,7 @@ def path_touches(
         for r in range(3):
             grid.p_AT[r] = curve.line.p_AT[r] + fraction * offset[r]
         wrist_goal(arm, curve.line.R_AT, grid.p_AT, curve.goal)
-        angle, _ = _path_at(grid.path, fraction)
+        angle, _ = _path_at(grid, fraction)
         sample_joints(arm, curve.goal, arm.branches[b], angle, motion.q)
         for joint in range(7):
             motion.delta[joint] = 0.0
@@ -264,7 +276,7 @@ def _fill_points(
         for r in range(3):
             line.target[r] = p_AT[r] = line.p_AT[r] + fraction * offset[r]
         wrist_goal(arm, line.R_AT, p_AT, curve.goal)
-        angle, rate = _path_at(grid.path, fraction)
+        angle, rate = _path_at(grid, fraction)
         sample_joints(arm, curve.goal, arm.branches[b], angle, q)
         if n > 0:
             for k in range(7):
@@ -301,17 +313,32 @@ def _is_too_fast(points: FloatArray, n: int, pieces: int, fastest: FloatArray) -
 
 
 @inner
-def _path_at(path: FloatArray, fraction: float) -> tuple[float, float]:
+def _path_at(grid: LineGrid, fraction: float) -> tuple[float, float]:
     """Return the free joint at a fraction of the line [rad], and its derivative by the fraction.
 
-    Between levels it follows cubics, with the mean rate of the two pieces at a level.
+    Between levels it follows cubics.
     """
-    at = fraction * PIECES
+    path, at = grid.path, fraction * PIECES
     n = min(int(at), PIECES - 1)
-    t, before, after = at - n, max(n - 1, 0), min(n + 2, PIECES)
-    step = path[n + 1] - path[n]
-    rate = (path[n + 1] - path[before]) / (n + 1 - before)
-    end_rate = (path[after] - path[n]) / (after - n)
+    t, step = at - n, path[n + 1] - path[n]
+    rate, end_rate = _rate_at(grid, n), _rate_at(grid, n + 1)
     c, d = 3.0 * step - 2.0 * rate - end_rate, rate + end_rate - 2.0 * step
     angle = path[n] + t * (rate + t * (c + t * d))
     return angle, PIECES * (rate + t * (2.0 * c + 3.0 * t * d))
+
+
+@inner
+def _rate_at(grid: LineGrid, level: int) -> float:
+    """Return the rate of the free joint at a level, per piece between levels [rad].
+
+    It is the mean rate of the two pieces; at an end that of one, or of the parabola through three
+    levels.
+    """
+    path = grid.path
+    before, after = max(level - 1, 0), min(level + 1, PIECES)
+    rate = (path[after] - path[before]) / (after - before)
+    if grid.is_bent[0] and level == 0:
+        rate += 0.5 * (rate - (path[2] - path[1]))
+    elif grid.is_bent[0] and level == PIECES:
+        rate += 0.5 * (rate - (path[PIECES - 1] - path[PIECES - 2]))
+    return rate

@@ -56,6 +56,10 @@ class LineGrid(NamedTuple):
     """Free joint at column 0, and spacing [rad], shape (2,)."""
     path: FloatArray
     """Free joint at each level of the current path [rad], shape (PIECES + 1,)."""
+    is_fine: BoolArray
+    """Whether the columns are closer than usual, shape (1,)."""
+    is_bent: BoolArray
+    """Whether the free joint has the rate of a parabola at both ends of the path, shape (1,)."""
 
 
 def new_grid() -> LineGrid:
@@ -72,6 +76,8 @@ def new_grid() -> LineGrid:
         np.zeros((BRANCHES, MAX_SAMPLES)),
         np.empty(2),
         np.empty(PIECES + 1),
+        np.zeros(1, np.bool_),
+        np.zeros(1, np.bool_),
     )
 
 
@@ -100,6 +106,7 @@ def place_columns(arm: ArmSolver, grid: LineGrid, through: float) -> int:
     step = max(STEP, (high - low) / (MAX_SAMPLES - 2))
     before = int((through - low) / step)
     grid.origin[0], grid.origin[1] = through - before * step, step
+    grid.is_fine[0] = False
     return before + 1 + int((high - through) / step)
 
 
@@ -120,6 +127,7 @@ def place_fine_columns(arm: ArmSolver, grid: LineGrid, through: float, step: flo
     before = min(most, int((through - arm.lower[arm.free]) / step)) if is_limited(arm) else most
     after = min(most, int((arm.upper[arm.free] - through) / step)) if is_limited(arm) else most
     grid.origin[0], grid.origin[1] = through - before * step, step
+    grid.is_fine[0] = True
     return before + 1 + after
 
 
@@ -263,6 +271,7 @@ def _nearest_to(ahead: IntArray, i: int, columns: int, most: int) -> int:
 @inner
 def take_path(grid: LineGrid, b: int, column: int) -> None:
     """Fill `path` with the angles of the free joint from a column at the goal on."""
+    grid.is_bent[0] = False
     for level in range(PIECES + 1):
         grid.path[level] = grid.origin[0] + column * grid.origin[1]
         column = grid.onward[b, level, column]

@@ -59,7 +59,9 @@ def approach_scene(problem: Problem) -> LineScene:
     for torso in range(1, problem.torso_levels):
         left = ~needed & apart
         if np.any(left):
-            scene = with_pairs(torso_scene(problem, torso), left)
+            fixed = first.fixed.copy()
+            fixed[problem.environment_body.size :] = problem.body_A[torso, : len(problem.body_body)]
+            scene = with_pairs(first._replace(fixed=fixed), left)
             needed[left] = needed_pairs(scene, problem.environment_bodies)
     scene = grouped(with_pairs(first, needed), carriers(problem))
     moving = np.flatnonzero(_is_moved(problem)[: len(problem.body_body)])

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.kernel.approach.pairs import Approach, approach_pair, follow_posture, new_approach
+from tcs.kernel.approach.memory import Approach, new_approach
+from tcs.kernel.approach.pairs import approach_pair, follow_posture
 from tcs.kernel.approach.scene import LineScene, approach_scene, place_scene
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.base_pose import environment_in_arm_base, goal_in_arm_base, place_base

@@ -8,7 +8,8 @@ distance d from the axis of joint k moves by at most `delta_k d` when that joint
 distance from the axis has grown by no more than the motion before (Schwarzer, Saha, Latombe 2005
 bound the motion of all postures at once, which is looser). Where the twist of the link at the
 middle posture is known, and what it leaves, `planes`, the motion from there is bounded by their sum
-too.
+too. Where the tool follows a straight line, `tool_line`, so is the motion of the last links by the
+joints between them and the tool.
 """
 
 from __future__ import annotations
@@ -22,10 +23,14 @@ from tcs.kernel.distances import distance_bound
 from tcs.kernel.kinematics import link_poses
 from tcs.kernel.motion.planes import TWISTED, plane_between
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
+from tcs.kernel.motion.tool_line import SEEN_FROM_TOOL, follows_line, line_motion, off_line
 
 COARSE = 0.02
 """Motion [m] above which bounding spheres alone decide whether a pair may meet on a piece: the
 exact distance is seldom greater, and the piece is halved anyway."""
+SMALL = 1e-3
+"""Motion [m] above which planes alone decide that for boxes: their exact distance takes as long as
+checking the pair on four pieces."""
 ROUNDING = 1e-9
 """Excess of the bounds [relative, and m], far above rounding errors of positions."""
 GROWN = 1.0 + ROUNDING
@@ -66,56 +71,104 @@ def _bound_motion_in_box(scene: MotionScene, work: MotionWorkspace, i: int, root
     frame = scene.link_frame[i]
     for k in range(frame + 1):
         work.motion[i, k], work.rest[i, k] = work.motion[root, k], work.rest[root, k]
+    work.by_tool[i] = work.by_tool[root]
+    twist = work.turn if work.by_tool[i] else work.twist
     work.motion[i, 0] = min(
-        work.motion[root, 0], _motion_of_twist(work, i, frame) + work.rest[root, 0]
+        work.motion[root, 0], _motion_of_twist(work, i, twist[frame]) + work.rest[root, 0]
     )
 
 
 @inner
 def _bound_motion(scene: MotionScene, work: MotionWorkspace, i: int) -> None:
     """Fill the rows of `motion` and `rest` of shape i, placed at the current posture."""
-    frame, shapes = scene.link_frame[i], work.shapes
-    # The two cap centres of a capsule; one centre for others.
-    half, radius = 0.0, shapes[i, BOUND]
-    if shapes[i, TYPE] == CAPSULE:
-        half, radius = shapes[i, SIZE + 1], shapes[i, SIZE]
-    x, y, z = shapes[i, CENTRE], shapes[i, CENTRE + 1], shapes[i, CENTRE + 2]
-    ax, ay, az = (
-        half * shapes[i, ROTATION + 2],
-        half * shapes[i, ROTATION + 5],
-        half * shapes[i, ROTATION + 8],
-    )
+    frame = scene.link_frame[i]
     total = second = 0.0
     work.motion[i, frame] = work.rest[i, frame] = 0.0
     for k in range(frame, 0, -1):
-        angle = work.delta[k - 1]
-        if angle > 0.0:
-            R, p = work.link_R[k], work.link_p[k]
-            dx, dy, dz = x - p[0], y - p[1], z - p[2]
-            square = _from_axis(R, dx + ax, dy + ay, dz + az)
-            if half > 0.0:
-                square = max(square, _from_axis(R, dx - ax, dy - ay, dz - az))
-            if shapes[i, TYPE] == BOX:
-                radius = _radius_about(shapes, i, R)
-            away = np.sqrt(square) + radius + total
-            # Of the second derivative of a point: the terms of two joints, of one, of its own.
-            second += (angle * (2.0 * total + angle * away) + work.bend[k - 1] * away) * GROWN
-            total += angle * away * GROWN
+        if work.delta[k - 1] > 0.0:
+            total, second = _with_joint(work, i, k, total, second)
         work.motion[i, k - 1], work.rest[i, k - 1] = total, 0.5 * second
+    work.by_tool[i] = False
     if work.posture[1] == TWISTED:
-        work.motion[i, 0] = min(total, _motion_of_twist(work, i, frame) + work.rest[i, 0])
+        if frame >= SEEN_FROM_TOOL and follows_line(work):
+            _bound_motion_by_tool(work, i, frame)
+        twist = work.turn if work.by_tool[i] else work.twist
+        moved = _motion_of_twist(work, i, twist[frame]) + work.rest[i, 0]
+        work.motion[i, 0] = min(work.motion[i, 0], moved)
 
 
 @inner
-def _motion_of_twist(work: MotionWorkspace, i: int, frame: int) -> float:
-    """Return a bound on the motion of any point of shape i by the twist of its link [m]."""
-    shapes, twist = work.shapes, work.twist
-    wx, wy, wz = twist[frame, 0], twist[frame, 1], twist[frame, 2]
+def _bound_motion_by_tool(work: MotionWorkspace, i: int, frame: int) -> None:
+    """Bound the motion of shape i on link `frame` by the joints between it and the tool.
+
+    The tool follows a line, so these joints alone decide how far the shape is from where `turn`
+    leads it. Fills the rows of `motion` and `rest` relative to what is fixed, and `by_tool`, where
+    they are less than by the joints between the shape and the base.
+    """
+    total = second = 0.0
+    for k in range(frame + 1, 8):
+        if work.delta[k - 1] > 0.0:
+            total, second = _with_joint(work, i, k, total, second)
+    off = off_line(work, total)
+    if 0.5 * second + off < work.rest[i, 0]:
+        work.by_tool[i], work.rest[i, 0] = True, 0.5 * second + off
+        work.motion[i, 0] = min(work.motion[i, 0], total + line_motion(work) + off)
+
+
+@inner
+def _with_joint(
+    work: MotionWorkspace, i: int, k: int, total: float, second: float
+) -> tuple[float, float]:
+    """Return how far a point of shape i moves on the piece if joint k moves too [m].
+
+    Args:
+        work: Scratch; shape i is placed.
+        i: The shape.
+        k: The joint, 1 .. 7, the next one on the way from the shape to the base, or to the tool.
+        total: Bound on the motion by the joints between.
+        second: Bound on their terms of the second derivative.
+
+    Returns:
+        `total` and `second` with joint k.
+    """
+    shapes, angle = work.shapes, work.delta[k - 1]
+    R, p = work.link_R[k], work.link_p[k]
+    dx, dy, dz = (
+        shapes[i, CENTRE] - p[0],
+        shapes[i, CENTRE + 1] - p[1],
+        shapes[i, CENTRE + 2] - p[2],
+    )
+    if shapes[i, TYPE] == CAPSULE:
+        # The two cap centres; one centre for others.
+        half, radius = shapes[i, SIZE + 1], shapes[i, SIZE]
+        ax, ay, az = (
+            half * shapes[i, ROTATION + 2],
+            half * shapes[i, ROTATION + 5],
+            half * shapes[i, ROTATION + 8],
+        )
+        square = max(
+            _from_axis(R, dx + ax, dy + ay, dz + az), _from_axis(R, dx - ax, dy - ay, dz - az)
+        )
+    else:
+        square, radius = _from_axis(R, dx, dy, dz), shapes[i, BOUND]
+        if shapes[i, TYPE] == BOX:
+            radius = _radius_about(shapes, i, R)
+    away = np.sqrt(square) + radius + total
+    # Of the second derivative of a point: the terms of two joints, of one, of its own.
+    second += (angle * (2.0 * total + angle * away) + work.bend[k - 1] * away) * GROWN
+    return total + angle * away * GROWN, second
+
+
+@inner
+def _motion_of_twist(work: MotionWorkspace, i: int, twist: FloatArray) -> float:
+    """Return a bound on the motion of any point of shape i by a twist of its link [m]."""
+    shapes = work.shapes
+    wx, wy, wz = twist[0], twist[1], twist[2]
     x, y, z = shapes[i, CENTRE], shapes[i, CENTRE + 1], shapes[i, CENTRE + 2]
     vx, vy, vz = (
-        wy * z - wz * y + twist[frame, 3],
-        wz * x - wx * z + twist[frame, 4],
-        wx * y - wy * x + twist[frame, 5],
+        wy * z - wz * y + twist[3],
+        wz * x - wx * z + twist[4],
+        wx * y - wy * x + twist[5],
     )
     moved = np.sqrt(vx * vx + vy * vy + vz * vz)
     return (moved + np.sqrt(wx * wx + wy * wy + wz * wz) * shapes[i, BOUND]) * GROWN
@@ -204,8 +257,9 @@ def may_touch_on_piece(
         return False
     if of_groups:
         return True
-    # Near two corners, boxes are farther apart than any plane tells.
-    near = moved > COARSE or closer(shapes, i, shapes, j, far)
+    # Boxes may be farther apart than any of these planes tells.
+    boxes = shapes[i, TYPE] == BOX and shapes[j, TYPE] == BOX
+    near = not boxes or moved > SMALL or closer(shapes, i, shapes, j, far)
     return near and not _table_clears(scene, work, k, within, True)
 
 

@@ -28,6 +28,7 @@ from tcs.kernel.collide import (
     between_segments,
 )
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
+from tcs.kernel.motion.tool_line import follows_line, take_turns
 
 TWISTED = 2
 """In `MotionWorkspace.posture`: joints move on the current piece, and the twists are filled."""
@@ -53,11 +54,15 @@ class RelativeMotion(NamedTuple):
 
 
 @inner
-def take_twists(work: MotionWorkspace) -> None:
+def take_twists(work: MotionWorkspace, half: float) -> None:
     """Fill the motion of each link on the piece, to first order, from `work.rate`.
 
     A point at r of link f moves by `w x r + v` until the end of the piece, and by as much backwards
     until its begin; w and v are the first and the last three of row f of `work.twist`.
+
+    Args:
+        work: `twist` is filled, and `turn` where the tool follows a line.
+        half: Half of the length of the piece, as a fraction of the curve.
     """
     twist = work.twist
     if work.posture[1] > 0:
@@ -75,6 +80,8 @@ def take_twists(work: MotionWorkspace) -> None:
         twist[k + 1, 3] = twist[k, 3] - (y * p[2] - z * p[1])
         twist[k + 1, 4] = twist[k, 4] - (z * p[0] - x * p[2])
         twist[k + 1, 5] = twist[k, 5] - (x * p[1] - y * p[0])
+    if follows_line(work):
+        take_turns(work, half)
 
 
 @inner
@@ -115,7 +122,8 @@ def _relative_motion(
     scene: MotionScene, work: MotionWorkspace, i: int, j: int, base: int, gap: float
 ) -> RelativeMotion:
     """Return the motion of shape i relative to shape j, see `plane_between`."""
-    shapes, twist, f = work.shapes, work.twist, scene.link_frame[i]
+    shapes, f = work.shapes, scene.link_frame[i]
+    twist = work.turn if base == 0 and work.by_tool[i] else work.twist
     wx, wy, wz = (
         twist[f, 0] - twist[base, 0],
         twist[f, 1] - twist[base, 1],
@@ -144,6 +152,8 @@ def _plane_across_shortest(
 
     They are not both boxes.
     """
+    if _face_keeps_away(shapes, i, j, motion, far):
+        return True
     half_i = shapes[i, SIZE + 1] if shapes[i, TYPE] == CAPSULE else 0.0
     half_j = shapes[j, SIZE + 1] if shapes[j, TYPE] == CAPSULE else 0.0
     # The shortest vector from the core of shape j to that of shape i, in A.
@@ -164,6 +174,29 @@ def _plane_across_shortest(
     if apart <= motion.least:
         return False
     return _keeps_apart(shapes, i, j, x / distance, y / distance, z / distance, motion)
+
+
+@inner
+def _face_keeps_away(
+    shapes: FloatArray, i: int, j: int, motion: RelativeMotion, far: float
+) -> bool:
+    """Return whether a face of the box among two shapes, if one is, keeps the other one far away.
+
+    This tells most pairs apart, in a fraction of the time that the shortest way takes.
+    """
+    a, b = (j, i) if shapes[j, TYPE] == BOX else (i, j)
+    if shapes[a, TYPE] != BOX:
+        return False
+    for m in range(3):
+        nx, ny, nz = (
+            shapes[a, ROTATION + m],
+            shapes[a, ROTATION + 3 + m],
+            shapes[a, ROTATION + 6 + m],
+        )
+        along = abs(nx * motion.x + ny * motion.y + nz * motion.z) - shapes[a, SIZE + m]
+        if along >= far and along - _extent(shapes, b, nx, ny, nz) >= far:
+            return True
+    return False
 
 
 @inner

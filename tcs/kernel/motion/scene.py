@@ -127,6 +127,12 @@ class MotionWorkspace(NamedTuple):
     """Bound on twice the motion of each joint beyond the first order [rad], shape (7,)."""
     twist: FloatArray
     """Motion of the links 0 .. 7 on half of the current piece, see `planes`, shape (8, 6)."""
+    line: FloatArray
+    """Straight motion of the tool on the current curve, see `tool_line`, shape (5,)."""
+    turn: FloatArray
+    """Motion of the links as `twist`, but as seen from the tool on that line, shape (8, 6)."""
+    by_tool: BoolArray
+    """Whether the first row of `rest` bounds what `turn` leaves, not `twist`, shape (n_arm,)."""
     control: FloatArray
     """Control points of the pieces of the current curve, cubic Bezier curves, the last one of each
     being the first one of the next [rad], shape (3 * MOST_PIECES + 1, 7)."""
@@ -324,6 +330,9 @@ def new_motion_workspace(scene: MotionScene) -> MotionWorkspace:
         rate=np.zeros(7),
         bend=np.zeros(7),
         twist=np.zeros((8, 6)),
+        line=np.array([0.0, 0.0, 0.0, np.inf, 0.0]),
+        turn=np.zeros((8, 6)),
+        by_tool=np.zeros(arm, np.bool_),
         control=np.empty((3 * MOST_PIECES + 1, 7)),
         pieces=np.ones(1, np.int64),
         met=np.zeros(1),

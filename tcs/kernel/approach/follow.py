@@ -1,0 +1,200 @@
+"""Following the line from a posture at the goal, around contacts that are met."""
+
+from __future__ import annotations
+
+from tcs.kernel.analytic.ik import sample_joints
+from tcs.kernel.approach.curve import fill_spline, path_touches, spline_is_free
+from tcs.kernel.approach.grid import NOWHERE, PIECES, close_node, column_at, take_path
+from tcs.kernel.approach.memory import ENOUGH, MOST_CURVES, UNKNOWN, Approach
+from tcs.kernel.approach.scene import pair_contact_code
+from tcs.kernel.arrays import FloatArray
+from tcs.kernel.cache import inner
+from tcs.kernel.contacts import (
+    NO_CONTACT,
+    arm_contact,
+    gripper_body_contact,
+    pair_touches,
+    place_coupled_links,
+    place_gripper,
+)
+from tcs.kernel.kinematics import link_poses
+from tcs.kernel.motion.straight import BLOCKED, DONE, LIMITS
+from tcs.kernel.problem import Problem
+
+GRIPPER = 7
+"""Link of the gripper, whose motion is the same from every posture."""
+WIDEST = 32
+"""Greatest number of nodes on either side of one in contact that are closed with it."""
+CLOSED = -2
+"""Outcome of a posture that is in contact, or has no path of the free joint."""
+
+
+@inner
+def follow(
+    problem: Problem,
+    approach: Approach,
+    fastest: FloatArray,
+    b: int,
+    column: int,
+    is_free: bool,
+) -> int:
+    """Follow the line from a node at the goal, around contacts that are met.
+
+    A node in contact is closed, and so is one from which the line cannot be followed.
+
+    Args:
+        problem: The scene.
+        approach: The grid is filled; so is the spline.
+        fastest: As for `approach_pair`.
+        b: The branch.
+        column: The column of the node.
+        is_free: Whether the node is known to be free of contact.
+
+    Returns:
+        DONE, LIMITS, BLOCKED or CLOSED.
+    """
+    grid, columns, scene = approach.grid, approach.columns, approach.scene
+    motion, curve = approach.motion, approach.curve
+    if is_free:
+        grid.is_free[b, 0, column] = True
+    outcome = CLOSED
+    while grid.onward[b, 0, column] != NOWHERE and columns[4] <= MOST_CURVES:
+        take_path(grid, b, column)
+        if columns[6] == 1 and path_touches(
+            problem.arm, scene, motion, grid, curve, b, approach.offset
+        ):
+            outcome = BLOCKED
+            if not is_free:
+                # Closing the node would close it to postures too whose lines lead past the contact.
+                break
+            level = curve.blocked[0]
+            i = column_at(grid, b, column, level)
+            close_node(grid, b, level, i, columns[0], columns[1])
+            continue
+        level, contact = _first_contact(problem, approach, b, column)
+        is_at_level = level != NOWHERE
+        # A contact counts on lines only that limits allow.
+        if level == NOWHERE or (level > 0 and approach.contact[0] == NO_CONTACT):
+            columns[4] += 1
+            if not _fill_spline(problem, approach, fastest, b):
+                outcome = LIMITS
+                break
+        if level == NOWHERE:
+            if spline_is_free(scene, motion, curve):
+                outcome = DONE
+                break
+            level, k = curve.blocked[0], curve.blocked[1]
+            contact = pair_contact_code(problem, scene, k)
+            if scene.pair[k, 2] == 0 and scene.link_frame[scene.pair[k, 0]] == GRIPPER:
+                approach.contact[0], columns[4] = contact, ENOUGH
+                outcome = BLOCKED
+                break
+        approach.columns[7] = level
+        if level > 0:
+            outcome = BLOCKED
+            if approach.contact[0] == NO_CONTACT:
+                approach.contact[0] = contact
+            if approach.gripper[level] >= 0:
+                columns[4] = ENOUGH
+                break
+        i = column_at(grid, b, column, level)
+        close_node(grid, b, level, i, columns[0], columns[1])
+        if is_at_level and approach.gripper[level] == NO_CONTACT:
+            _close_beside(problem, approach, b, level, i)
+    if outcome != DONE:
+        close_goal(approach, b, column)
+    return outcome
+
+
+@inner
+def _fill_spline(problem: Problem, approach: Approach, fastest: FloatArray, b: int) -> bool:
+    """Follow the line along `grid.path`; return whether the joints keep their limits.
+
+    Narrow windows seldom lie at a constant rate: in them the path is tried with bent ends too.
+    """
+    grid, curve, offset = approach.grid, approach.curve, approach.offset
+    scene, motion = approach.scene, approach.motion
+    for n in range(2 if grid.is_fine[0] else 1):
+        grid.is_bent[0] = n == 1
+        if fill_spline(problem.arm, scene, motion, grid, curve, b, offset, fastest):
+            return True
+    return False
+
+
+@inner
+def _close_beside(problem: Problem, approach: Approach, b: int, level: int, column: int) -> None:
+    """Close the nodes beside one in contact in which the same two shapes touch."""
+    grid, columns = approach.grid, approach.columns
+    for side in range(2):
+        i, step = column, 2 * side - 1
+        for _ in range(WIDEST):
+            i += step
+            if (
+                not 0 <= i < columns[0]
+                or not grid.is_open[b, level, i]
+                or grid.is_free[b, level, i]
+                or not _last_touches(problem, approach, b, i, level)
+            ):
+                break
+            close_node(grid, b, level, i, columns[0], columns[1])
+
+
+@inner
+def _last_touches(problem: Problem, approach: Approach, b: int, i: int, level: int) -> bool:
+    """Return whether the two shapes found in contact last touch at a node of the grid."""
+    work, grid, q = approach.work, approach.grid, approach.search.q
+    angle = grid.origin[0] + i * grid.origin[1]
+    sample_joints(problem.arm, grid.goal[level], problem.arm.branches[b], angle, q)
+    link_poses(problem.chain_R, problem.chain_p, q, work.link_R, work.link_p)
+    if len(problem.coupled):
+        place_coupled_links(problem, work, q)
+    partner, first, second = work.last[0], work.last[1], work.last[2]
+    body_A = problem.body_A[approach.columns[5]]
+    return partner >= 0 and pair_touches(problem, work, body_A, q, partner, first, second)
+
+
+@inner
+def close_goal(approach: Approach, b: int, column: int) -> None:
+    """Close a node at the goal."""
+    approach.grid.is_open[b, 0, column] = False
+    approach.grid.onward[b, 0, column] = NOWHERE
+
+
+@inner
+def _first_contact(problem: Problem, approach: Approach, b: int, column: int) -> tuple[int, int]:
+    """Return a level at which the path from a column is in contact, or NOWHERE, and the contact.
+
+    Until a contact is known, most paths are free, and only the goal is checked.
+    """
+    grid = approach.grid
+    levels = 1 if approach.contact[0] == NO_CONTACT else PIECES + 2
+    for n in range(levels):
+        # The goal, then where a line was blocked last, then from the begin of the approach on.
+        level = 0 if n == 0 else (approach.columns[7] if n == 1 else PIECES + 2 - n)
+        i = column_at(grid, b, column, level)
+        if grid.is_free[b, level, i]:
+            continue
+        contact = contact_at(problem, approach, b, i, level)
+        if contact != NO_CONTACT:
+            return level, contact
+        grid.is_free[b, level, i] = True
+    return NOWHERE, NO_CONTACT
+
+
+@inner
+def contact_at(problem: Problem, approach: Approach, b: int, i: int, level: int) -> int:
+    """Return the contact of a node of the grid, or NO_CONTACT."""
+    work, grid, q, gripper = approach.work, approach.grid, approach.search.q, approach.gripper
+    body_A = problem.body_A[approach.columns[5]]
+    for r in range(3):
+        work.p_AG[r] = approach.curve.line.p_AT[r] + level / PIECES * approach.offset[r]
+    if gripper[level] == UNKNOWN:
+        gripper[level] = gripper_body_contact(problem, work, body_A)
+    elif gripper[PIECES + 1] != level:
+        place_gripper(problem, work, work.R_AG, work.p_AG)
+    gripper[PIECES + 1] = level
+    if gripper[level] != NO_CONTACT:
+        return gripper[level]
+    angle = grid.origin[0] + i * grid.origin[1]
+    sample_joints(problem.arm, grid.goal[level], problem.arm.branches[b], angle, q)
+    return arm_contact(problem, work, body_A, q)
