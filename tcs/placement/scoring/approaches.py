@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +19,7 @@ from tcs.model.tasks import TOOL_SPEED
 from tcs.placement.scoring.job import Job
 
 if TYPE_CHECKING:
+    from tcs.kernel.approach.scene import LineScene
     from tcs.kernel.approach.sweep import ApproachLines
 
 SLICE = 256
@@ -66,72 +69,82 @@ def check_closed_form(problem: Problem) -> None:
         )
 
 
-def warm_up_approaches(problem: Problem, lines: ApproachLines) -> float:
-    """Compile the kernel of approaches or load its machine code; return the time this took [s]."""
-    begun = time.perf_counter()
-    empty = np.empty((0, problem.goal_p.shape[1]))
-    score_with_approach(
-        problem,
-        lines,
-        empty.astype(np.uint8),
-        empty.astype(np.int32),
-        empty.astype(np.float32),
-        np.empty((0, 7), np.float32),
-        jobs=1,
-    )
-    return time.perf_counter() - begun
+@dataclass(eq=False)
+class ApproachScorer:
+    """Scoring of the approaches of a problem, after all else."""
 
+    problem: Problem
+    """The scene, its goals and its grid."""
+    lines: ApproachLines
+    """The approaches of the goals."""
 
-def score_with_approach(
-    problem: Problem,
-    lines: ApproachLines,
-    reason: NDArray[np.uint8],
-    contact: NDArray[Any],
-    dexterity: NDArray[np.float32],
-    joints: NDArray[np.float32],
-    *,
-    jobs: int,
-) -> NDArray[np.float32]:
-    """Replace the scores of reached pairs by those of their best approachable postures.
+    @cached_property
+    def scene(self) -> LineScene:
+        """The shapes around all lines, which take a tenth of a second to arrange."""
+        # Imported here, as below: scoring without approach does not import this part of the kernel.
+        from tcs.kernel.approach.scene import approach_scene
 
-    Args:
-        problem: The scene, its goals and its grid.
-        lines: The approaches of the goals.
-        reason: Reasons, replaced where no posture is approachable, shape (H, G).
-        contact: Contact codes, replaced where the approach is blocked, shape (H, G).
-        dexterity: Replaced where another posture is the best, shape (H, G).
-        joints: Arm joints of the R reached pairs [rad], shape (R, 7).
-        jobs: Number of threads; the scores do not depend on it.
+        return approach_scene(self.problem)
 
-    Returns:
-        Arm joints of the pairs that remain reached [rad].
-    """
-    from tcs.kernel.approach.scene import approach_scene
-    from tcs.kernel.approach.sweep import ReachedPairs, score_approaches
+    def warm_up(self) -> float:
+        """Compile the kernel or load its machine code; return the time this took [s]."""
+        begun = time.perf_counter()
+        empty = np.empty((0, self.problem.goal_p.shape[1]))
+        self.score(
+            empty.astype(np.uint8),
+            empty.astype(np.int32),
+            empty.astype(np.float32),
+            np.empty((0, 7), np.float32),
+            jobs=1,
+        )
+        return time.perf_counter() - begun
 
-    found_pairs = (
-        np.argwhere(reason[rows] == 0) + np.array([rows.start, 0]) for rows in chunks(reason)
-    )
-    pairs = np.concatenate([np.empty((0, 2), np.int64), *found_pairs])
-    rows, columns = pairs.T
-    scene = approach_scene(problem)
+    def score(
+        self,
+        reason: NDArray[np.uint8],
+        contact: NDArray[Any],
+        dexterity: NDArray[np.float32],
+        joints: NDArray[np.float32],
+        *,
+        jobs: int,
+    ) -> NDArray[np.float32]:
+        """Replace the scores of reached pairs by those of their best approachable postures.
 
-    def part(start: int) -> ReachedPairs:
-        chosen = slice(start, start + SLICE)
-        at = rows[chosen], columns[chosen]
-        scores = ReachedPairs(
-            pairs[chosen], reason[at], contact[at].astype(np.int32), dexterity[at],
-            joints[chosen].copy(),
-        )  # fmt: skip
-        score_approaches(problem, lines, scores, scene)
-        return scores
+        Args:
+            reason: Reasons, replaced where no posture is approachable, shape (H, G).
+            contact: Contact codes, replaced where the approach is blocked, shape (H, G).
+            dexterity: Replaced where another posture is the best, shape (H, G).
+            joints: Arm joints of the R reached pairs [rad], shape (R, 7).
+            jobs: Number of threads; the scores do not depend on it.
 
-    found = Parallel(n_jobs=jobs, prefer="threads")(
-        delayed(part)(start) for start in range(0, max(len(pairs), 1), SLICE)
-    )
-    scores = ReachedPairs(*map(np.concatenate, zip(*found, strict=True)))
-    reason[rows, columns] = scores.reason
-    contact[rows, columns] = scores.contact
-    dexterity[rows, columns] = scores.dexterity
-    kept: NDArray[np.float32] = scores.joints[scores.reason == 0]
-    return kept
+        Returns:
+            Arm joints of the pairs that remain reached [rad].
+        """
+        from tcs.kernel.approach.sweep import ReachedPairs, score_approaches
+
+        found_pairs = (
+            np.argwhere(reason[rows] == 0) + np.array([rows.start, 0]) for rows in chunks(reason)
+        )
+        pairs = np.concatenate([np.empty((0, 2), np.int64), *found_pairs])
+        rows, columns = pairs.T
+        scene = self.scene
+
+        def part(start: int) -> ReachedPairs:
+            chosen = slice(start, start + SLICE)
+            at = rows[chosen], columns[chosen]
+            scores = ReachedPairs(
+                pairs[chosen], reason[at], contact[at].astype(np.int32), dexterity[at],
+                joints[chosen].copy(),
+            )  # fmt: skip
+            score_approaches(self.problem, self.lines, scores, scene)
+            return scores
+
+        found = Parallel(n_jobs=jobs, prefer="threads")(
+            delayed(part)(start) for start in range(0, max(len(pairs), 1), SLICE)
+        )
+        scores = ReachedPairs(*map(np.concatenate, zip(*found, strict=True)))
+        reason[rows, columns] = scores.reason
+        contact[rows, columns] = scores.contact
+        dexterity[rows, columns] = scores.dexterity
+        kept: NDArray[np.float32] = scores.joints[scores.reason == 0]
+        return kept

@@ -5,18 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from tcs.files.memory import CODE, COMPILING, check_room
 from tcs.kernel.analytic.solver import is_outside
 from tcs.kernel.cache import is_compiled
 from tcs.kernel.problem import Problem
 from tcs.kernel.sweep import gripper_contacts
-from tcs.placement.scoring.approaches import ENTRY, check_closed_form, warm_up_approaches
+from tcs.placement.scoring.approaches import ENTRY, ApproachScorer, check_closed_form
 from tcs.placement.scoring.engines import Work
-
-if TYPE_CHECKING:
-    from tcs.kernel.approach.sweep import ApproachLines
 
 ANALYTIC, NUMERIC = "analytic", "numeric"
 """Solution of the inverse kinematics: in closed form, or by Newton's method from many starts."""
@@ -34,8 +30,8 @@ class KernelStart:
     """Returns problems whose scoring needs all the machine code."""
     on_compile: Callable[[], None] | None = None
     """Called first if the kernel has to be compiled."""
-    approaches: ApproachLines | None = None
-    """The approaches that will be scored."""
+    approaches: ApproachScorer | None = None
+    """Who will score approaches."""
     seconds: float = 0.0
     """Time that this has taken [s]."""
     is_done: bool = field(default=False, init=False)
@@ -62,7 +58,7 @@ def ik_of(problem: Problem) -> str:
 def warm_up(
     problem: Problem,
     on_compile: Callable[[], None] | None = None,
-    approaches: ApproachLines | None = None,
+    approaches: ApproachScorer | None = None,
 ) -> float:
     """Compile the kernel or load its machine code; return the time this took [s].
 
@@ -81,4 +77,4 @@ def warm_up(
     begun = time.perf_counter()
     Work(problem, gripper_contacts(problem)).warm_up()
     seconds = time.perf_counter() - begun
-    return seconds + (0.0 if approaches is None else warm_up_approaches(problem, approaches))
+    return seconds + (0.0 if approaches is None else approaches.warm_up())

@@ -18,7 +18,7 @@ from tcs.model.robots import RobotFile
 from tcs.model.scene import EnvironmentFile, Observation, estimate_joints
 from tcs.model.tasks import Task
 from tcs.placement.constraints import Constraints
-from tcs.placement.scoring.approaches import approach_lines
+from tcs.placement.scoring.approaches import ApproachScorer, approach_lines
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.kernel_start import warm_up
 from tcs.placement.scoring.offline import NO_CONSTRAINTS, ScoringSetup
@@ -80,7 +80,8 @@ class LiveScorer:
         lowered = self._job_at({}).lowered(self._setup.scene)
         self._scene_in_use = threading.Lock()
         problem = build_problem(lowered.arrays, lowered.grid, measure)
-        warm_up(problem, on_compile, approach_lines(self.job) if approach else None)
+        scorer = ApproachScorer(problem, approach_lines(self.job)) if approach else None
+        warm_up(problem, on_compile, scorer)
 
     @property
     def job(self) -> Job:

@@ -19,7 +19,7 @@ from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.sweep import gripper_contacts
 from tcs.model.scene import LoweredScene
-from tcs.placement.scoring.approaches import score_with_approach
+from tcs.placement.scoring.approaches import ApproachScorer
 from tcs.placement.scoring.blocks import BLOCK, Block, Kept
 from tcs.placement.scoring.engines import Part, ScoringEngine, Threads, Work
 from tcs.placement.scoring.engines.work import JOINTS
@@ -95,7 +95,8 @@ def sweep(
     if jobs < 1:
         raise TcsError(f"jobs is {jobs}; must be 1 or more threads.")
     problem = build_problem(lowered.arrays, lowered.grid, measure)
-    start = KernelStart(lambda: [problem], on_compile, approaches)
+    scorer = None if approaches is None else ApproachScorer(problem, approaches)
+    start = KernelStart(lambda: [problem], on_compile, scorer)
     size, goals = _size(problem), problem.goal_p.shape[1]
     begun = time.perf_counter()
     reason: NDArray[np.uint8] = large_zeros((size, goals), np.uint8)
@@ -129,13 +130,11 @@ def sweep(
     winning = np.concatenate(
         [np.empty((0, JOINTS), np.float32), *(joints[part] for part in sorted(joints))]
     )
-    if approaches is not None:
+    if scorer is not None:
         start.ensure()
     approach_begun = time.perf_counter()
-    if approaches is not None:
-        winning = score_with_approach(
-            problem, approaches, reason, contact, dexterity, winning, jobs=jobs
-        )
+    if scorer is not None:
+        winning = scorer.score(reason, contact, dexterity, winning, jobs=jobs)
     done_at = time.perf_counter()
     names = name_contacts(contact, lowered, problem)
     states = [slice(i * size // tables, (i + 1) * size // tables) for i in range(tables)]
