@@ -6,6 +6,8 @@ progress on stderr, and an exit code.
 
 from __future__ import annotations
 
+import atexit
+import gc
 import sys
 
 from tcs.files.memory import (
@@ -22,12 +24,19 @@ from tcs.interrupts import (
     was_interrupted,
 )
 
+COLLECTING = (10_000, 20, 20)
+"""Thresholds of `gc.set_threshold`: modules hold hundreds of thousands of objects, which Python, by
+its own thresholds, searches for garbage again and again while they are imported."""
+
 
 def main() -> None:
     """Run the command line.
 
     An interrupt, or too little memory, ends it in one line even while modules are imported.
     """
+    gc.set_threshold(*COLLECTING)
+    # The system takes back what an ended process holds: no search for garbage in all of it.
+    atexit.register(gc.freeze)
     with remember_interrupts(to_the_end=True):
         try:
             check_room(START)
