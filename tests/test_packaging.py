@@ -3,6 +3,7 @@ import re
 import runpy
 import subprocess
 import sys
+import tarfile
 import tomllib
 import zipfile
 from pathlib import Path
@@ -170,3 +171,14 @@ def test_wheel_works_away_from_the_checkout(wheel, tmp_path):
     )
     lines = run("-c", code, cwd=tmp_path, path=site).splitlines()
     assert lines == [str(site / "tcs" / "_data"), " ".join(task_names()), "8"]
+
+
+def test_source_archive_carries_what_make_and_the_licence_need(tmp_path):
+    run("-m", "hatchling", "build", "--target", "sdist", "--directory", tmp_path, cwd=CHECKOUT)
+    (built,) = tmp_path.glob("tcs-*.tar.gz")
+    with tarfile.open(built) as archive:
+        names = {name.partition("/")[2] for name in archive.getnames()}
+    makefile = (CHECKOUT / "Makefile").read_text(encoding="utf-8")
+    scripts = set(re.findall(r"\b(?:scripts|benchmarks)/\w+\.py", makefile))
+    assert {"Makefile", "pyproject.toml", "requirements.lock", "tcs/__init__.py"} <= names
+    assert {"LICENSE", "THIRD_PARTY.md", *scripts} <= names
