@@ -93,6 +93,12 @@ def test_page_tells_oldest_and_newest_versions():
     assert described == dependencies()
 
 
+def test_lower_bounds_are_of_series_that_are_tested():
+    locked = VERSIONS["versions_with"](VERSIONS["PYTHONS"][0])
+    for name, (least, _) in VERSIONS["dependencies"]().items():
+        assert f"{locked[name]}.".startswith(f"{least}."), name
+
+
 def test_every_tested_python_is_declared_and_locked():
     declared = [
         line.rpartition(" :: ")[2]
