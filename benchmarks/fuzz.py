@@ -4,7 +4,7 @@ A mutant is refused in one line, or accepted; anything else is a defect: a trace
 that ends, a hang, or a false answer. Accepted tasks, environments, models and robots are scored on
 a small grid, one in `--score-every`, and Drake re-checks some of the answers.
 
-    python benchmarks/fuzz.py --mutants 5000 --save
+    python benchmarks/fuzz.py --mutants 10000 --score-every 100 --save
     python benchmarks/fuzz.py --mutants 1 --only URDF --first 1234    # one mutant again
 """
 
@@ -32,8 +32,8 @@ from fuzz_further_files import ALL_TYPES, prepare
 from fuzz_mutations import damaged
 from worker import Worker
 
-SECONDS = 60.0
-"""Most processor time for one mutant [s]; scoring one takes some seconds."""
+SECONDS = 10.0
+"""Most processor time for one mutant [s]; scoring one takes a second or two."""
 MEMORY = 2 * 1024**3
 """Most memory that a mutant may take beyond that of a started worker [bytes]."""
 DAMAGED = 0.2
@@ -178,6 +178,7 @@ def judge_all(name: str, numbers: range, options: argparse.Namespace, folder: Pa
     slow = f"slowest {slowest[0]:.1f} s (mutant {slowest[1]})"
     table.row(name, f"{shown}; {count['pairs']} pairs re-checked; {slow}")
     count["accepted"] += count["scored"]
+    table.cell("fuzz", name, "mutants", f"{len(numbers):,}")
     for outcome in OUTCOMES:
         table.cell("fuzz", name, outcome, f"{count[outcome]:,}")
     table.cell("fuzz", name, "pairs re-checked", f"{count['pairs']:,}")

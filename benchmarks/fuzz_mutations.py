@@ -59,7 +59,7 @@ def pick(rng: np.random.Generator, values: Any) -> Any:
 def plausible(value: float, rng: np.random.Generator) -> float:
     """Return another number of the same order, or of a wrong unit."""
     if rng.random() < 0.3:
-        return float(value * 10.0 ** rng.integers(-3, 4))
+        return value * 10.0 ** int(rng.integers(-3, 4))
     return float(value * rng.uniform(-1.5, 1.5) + (rng.random() < 0.3) * rng.normal(0.0, 0.3))
 
 

@@ -152,6 +152,14 @@ def test_a_mutant_is_the_same_in_every_run(scripts, folder):
         assert any(fuzz.mutant(file_type, original, 7, k) != one for k in range(4, 8))
 
 
+def test_a_mutation_of_the_largest_number_is_no_defect(scripts):
+    from fuzz_mutations import plausible
+
+    rng = np.random.default_rng(0)
+    # Ten times the largest number, without a warning, which would end the worker.
+    assert max(plausible(1e308, rng) for _ in range(50)) == np.inf
+
+
 def test_defects_differ(scripts, folder):
     """The judge of a mutant reports a traceback and more than one line as what they are."""
     fuzz, fuzz_files, _ = scripts
