@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import resource
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -173,6 +174,7 @@ def ran(job: Job, folder: Path, until: str | None) -> dict[str, Any] | None:
         found = {
             "scoring_seconds": _scoring_seconds(times),
             "processor_seconds": time.process_time() - begun,
+            "peak_bytes": 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss,
             "file_bytes": saved.stat().st_size,
             "best": len(file.nominal.sets.best),
             "whole": whole,
@@ -254,6 +256,7 @@ def run_lines(
     took = sum(run["scoring_seconds"] for _, run in done)
     of_plan = sum(plan["scoring_seconds"] for plan, _ in done)
     whole_jobs = sum(run["processor_seconds"] for _, run in done)
+    peak = max(run["peak_bytes"] for _, run in done)
     return [
         ["jobs to run", f"{len(plans):,}"],
         ["jobs run", f"{len(pairs):,}"],
@@ -263,6 +266,7 @@ def run_lines(
         ["scoring of these, hours of one core", f"{took / 3600:.3f}"],
         ["times the planned", f"{took / of_plan:.2f}"],
         ["all of these jobs, hours of one core", f"{whole_jobs / 3600:.3f}"],
+        ["greatest memory of a process that runs them [MB]", f"{peak / 1e6:,.0f}"],
     ]
 
 
