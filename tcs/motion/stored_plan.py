@@ -25,6 +25,11 @@ _MOST = 1e9
 """Greatest absolute number of a plan: accelerations of larger ones would overflow."""
 _LEAST_STEP = 1e-12
 """Least step of the times of a segment [s], likewise."""
+_FAULTS = (
+    *(KeyError, TypeError, ValueError, AttributeError),
+    *(OverflowError, RecursionError, TcsError),
+)
+"""What reading something else than a plan raises."""
 SEGMENT_TYPES = ("move", "approach", "retreat")
 _BASE = ("base_x", "base_y", "base_yaw_deg", "torso")
 _STOP = (*_BASE, "configuration", "goals", "returns", "duration", "segments")
@@ -46,7 +51,7 @@ def load_plan(path: str | os.PathLike[str]) -> MotionPlan:
     text = read_text(path, where, StoreFormatError, limit=MAX_BYTES)
     try:
         return _plan(json.loads(text))
-    except (KeyError, TypeError, ValueError, AttributeError, RecursionError, TcsError) as error:
+    except _FAULTS as error:
         fault = f"lacks {error}" if isinstance(error, KeyError) else one_line(str(error), 160)
         raise StoreFormatError(
             f"{where} is not a plan of tcs ({fault}). Make it with: tcs plan FILE --out plan.json"
@@ -64,9 +69,9 @@ def _plan(plain: Mapping[str, Any]) -> MotionPlan:
         joints=joints,
         stops=tuple(_stop(stop) for stop in plain["stops"]),
         results=tuple(_result(result) for result in plain["results"]),
-        edges=int(verified["edges"]),
-        false=int(verified["false"]),
-        seed=int(plain["seed"]),
+        edges=_integer(verified["edges"]),
+        false=_integer(verified["false"]),
+        seed=_integer(plain["seed"]),
         seconds=_number(plain["seconds"]),
         jerk_limits=_jerk_limits(plain.get("jerk_limits")),
     )
@@ -98,7 +103,7 @@ def _stop(plain: Mapping[str, Any]) -> StopPlan:
     )
     return StopPlan(
         at=at,
-        index=None if plain["configuration"] is None else int(plain["configuration"]),
+        index=None if plain["configuration"] is None else _integer(plain["configuration"]),
         segments=tuple(_segment(segment) for segment in plain["segments"]),
         returns=bool(plain["returns"]),
     )
@@ -114,7 +119,7 @@ def _segment(plain: Mapping[str, Any]) -> Segment:
         raise ValueError("a segment must have seven positions and velocities for each of its times")
     if times[0] != 0.0 or not np.all(np.diff(times) >= _LEAST_STEP):
         raise ValueError("the times of a segment must ascend from 0")
-    start, end = (None if plain[key] == "rest" else int(plain[key]) for key in ("from", "to"))
+    start, end = (None if plain[key] == "rest" else _integer(plain[key]) for key in ("from", "to"))
     curve = Curve(times, positions, velocities)
     return Segment(plain["type"], start, end, (curve,), Timed(times, positions, velocities))
 
@@ -122,8 +127,8 @@ def _segment(plain: Mapping[str, Any]) -> Segment:
 def _result(plain: Mapping[str, Any]) -> GoalResult:
     pair = plain.get("pair")
     return GoalResult(
-        goal=int(plain["goal"]),
-        stop=None if plain["stop"] is None else int(plain["stop"]),
+        goal=_integer(plain["goal"]),
+        stop=None if plain["stop"] is None else _integer(plain["stop"]),
         done=bool(plain["done"]),
         reason=str(plain.get("reason", "")),
         pair=None if pair is None else (str(pair[0]), str(pair[1])),
@@ -136,6 +141,13 @@ def _number(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise ValueError("numbers must be finite")
     return float(value)
+
+
+def _integer(value: Any) -> int:
+    number = _number(value)
+    if not number.is_integer():
+        raise ValueError("goals, stops, counts and seeds must be whole numbers")
+    return int(value)
 
 
 def _array(value: Any, dimensions: int) -> FloatArray:

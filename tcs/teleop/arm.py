@@ -115,7 +115,7 @@ class Arm:
         """
         try:
             values = np.array(joints, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (OverflowError, TypeError, ValueError):
             values = np.empty(0)
         if values.shape != (JOINTS,) or not np.isfinite(values).all():
             raise TcsError(

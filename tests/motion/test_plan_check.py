@@ -99,6 +99,12 @@ def test_a_plan_for_other_models_is_refused(changed):
         lambda plain: plain["stops"][0]["segments"][0]["positions"].pop(),
         lambda plain: plain["stops"][0]["segments"][0]["velocities"][1].__setitem__(0, 1e300),
         lambda plain: plain["stops"][0]["segments"][0]["times"].__setitem__(1, 1e-300),
+        lambda plain: plain["stops"][0]["segments"][1].update(to=float("inf")),
+        lambda plain: plain["stops"][0]["segments"][1].update(to=0.5),
+        lambda plain: plain.update(seed="0"),
+        # Larger than a floating-point number.
+        lambda plain: plain["stops"][0]["segments"][0]["times"].__setitem__(1, 10**400),
+        lambda plain: plain["stops"][0].update(base_x=10**400),
     ],
 )
 def test_damaged_plans_are_one_line(changed, change):

@@ -81,8 +81,11 @@ def test_arrays_cannot_be_written_to():
 
 @pytest.mark.parametrize(
     "joints",
-    [[0.0] * 6, [0.0] * 8, [0.0] * 6 + [np.nan], [0.0] * 6 + [np.inf], "seven", None, [[0.0] * 7]],
-    ids=["six", "eight", "nan", "inf", "text", "nothing", "nested"],
+    [
+        *([0.0] * 6, [0.0] * 8, [0.0] * 6 + [np.nan], [0.0] * 6 + [np.inf]),
+        *("seven", None, [[0.0] * 7], [10**400] * 7),
+    ],
+    ids=["six", "eight", "nan", "inf", "text", "nothing", "nested", "enormous"],
 )
 def test_joints_that_are_not_seven_numbers_are_refused(joints):
     with pytest.raises(TcsError, match="must be 7 finite numbers"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import sys
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from functools import lru_cache
@@ -52,7 +52,7 @@ class Axis:
             raise GridError(f"{where}: unit is {self.unit!r}, but must be one of {_listed(UNITS)}.")
         for key in ("start", "step"):
             number = getattr(self, key)
-            if not _is_number(number) or not math.isfinite(number):
+            if not _is_finite(number):
                 raise GridError(f"{where}: {key} is {number!r}, but must be a finite number.")
         if not isinstance(self.count, int) or isinstance(self.count, bool):
             raise GridError(f"{where}: count is {self.count!r}, but must be a whole number.")
@@ -171,8 +171,11 @@ _KEYS = tuple(field.name for field in fields(Axis))
 _SPEC_KEYS = _KEYS[1:]
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float | np.floating) and not isinstance(value, bool)
+def _is_finite(value: object) -> bool:
+    if isinstance(value, bool) or not isinstance(value, int | float | np.floating):
+        return False
+    # An integer may be larger than every float.
+    return bool(-sys.float_info.max <= value <= sys.float_info.max)
 
 
 def _only_keys(

@@ -22,7 +22,7 @@ def finite(field: str, numbers: ArrayLike, names: Sequence[str]) -> NDArray[np.f
     wanted = f"{len(names)} finite numbers ({', '.join(names)})"
     try:
         array = np.array(numbers, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (OverflowError, TypeError, ValueError):
         raise TaskError(f"field '{field}' is {numbers!r}, but must be {wanted}.") from None
     if array.shape != (len(names),) or not np.all(np.isfinite(array)):
         raise TaskError(f"field '{field}' is {array.tolist()}, but must be {wanted}.")

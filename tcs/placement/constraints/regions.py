@@ -44,7 +44,7 @@ class Region:
         """
         try:
             vertices = tuple((float(x), float(y)) for x, y in self.vertices)
-        except (TypeError, ValueError):
+        except (OverflowError, TypeError, ValueError):
             raise SelectionError("Region: each vertex must be two numbers, x and y [m].") from None
         if not 3 <= len(set(vertices)) <= len(vertices) <= MAX_VERTICES:
             raise SelectionError(

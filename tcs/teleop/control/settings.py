@@ -75,7 +75,7 @@ class Command:
         for name, unit in (("linear", "m/s"), ("angular", "rad/s")):
             try:
                 values = np.asarray(getattr(self, name), dtype=np.float64)
-            except (TypeError, ValueError):
+            except (OverflowError, TypeError, ValueError):
                 values = np.empty(0)
             if values.shape != (3,):
                 return f"its {name} velocity must be 3 numbers [{unit}]"
@@ -187,7 +187,7 @@ def _is_posture(joints: FloatArray | tuple[float, ...]) -> bool:
     """Return whether a set-point is one finite number for each joint."""
     try:
         values = np.asarray(joints, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (OverflowError, TypeError, ValueError):
         return False
     return values.shape == (JOINTS,) and bool(np.isfinite(values).all())
 

@@ -139,7 +139,7 @@ class Run:
         """The line to follow, in the robot's base; None if the metadata contain none."""
         try:
             return Line(*(tuple(self.metadata[name]) for name in ("line_start", "line_end")))
-        except (KeyError, TypeError, ValueError, DataFileError):
+        except (KeyError, OverflowError, TypeError, ValueError, DataFileError):
             return None
 
     def hand(self) -> tuple[FloatArray, FloatArray]:

@@ -66,7 +66,7 @@ def _is_on(metadata: Mapping[str, Any], study: Study) -> bool:
     """Return whether the metadata of a run name the line of a study."""
     try:
         ends = np.array([metadata["line_start"], metadata["line_end"]], dtype=np.float64)
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, OverflowError, TypeError, ValueError):
         return False
     line = np.array([study.line.start, study.line.end])
     return ends.shape == line.shape and bool((np.abs(ends - line) <= _SAME_LINE).all())

@@ -56,6 +56,7 @@ def test_a_single_value_needs_no_step():
         ({"start": "0"}, "start is '0', but must be a finite number"),
         ({"step": math.inf}, "step is inf, but must be a finite number"),
         ({"step": True}, "step is True, but must be a finite number"),
+        ({"step": 10**400}, "0, but must be a finite number"),
         ({"step": 0}, "step is 0 m, but must be positive"),
         ({"step": -0.1}, "step is -0.1 m, but must be positive"),
         ({"count": 0}, "the grid would be empty"),

@@ -74,6 +74,7 @@ def test_tasks_can_be_pickled():
         ({"position": [0.1, 0.2]}, "must be 3 finite numbers (x, y, z)"),
         ({"position": [0.1, math.nan, 0.2]}, "must be 3 finite numbers"),
         ({"position": ["a", 0, 0]}, "must be 3 finite numbers"),
+        ({"position": [10**400, 0, 0]}, "must be 3 finite numbers"),
         ({"position": [133.7, 1.8, -109.8]}, "Write metres"),
         ({"quaternion": [1, 0, 0]}, "must be 4 finite numbers (w, x, y, z)"),
         ({"quaternion": [math.inf, 0, 0, 0]}, "must be 4 finite numbers"),

@@ -74,6 +74,7 @@ def test_a_region_is_read_from_a_file(tmp_path):
         ("polygon: [[0, 0], [1], [1, 1]]", "must be .x, y."),
         ("polygon: [[0, 0], [1, yes], [1, 1]]", "must be .x, y."),
         ("polygon: [[0, 0], [1, 1]]", "has 2 different vertices; must have 3 to 1000"),
+        (f"polygon: [[{10**400}, 0], [1, 0], [1, 1]]", "must be two numbers"),
         ("5", "must contain keys and values: polygon"),
     ],
 )

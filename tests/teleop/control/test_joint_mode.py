@@ -77,7 +77,9 @@ def test_the_tool_stays_when_the_mode_changes(iiwa, ready):
     assert off(steps, steps[0].p) < 1e-9
 
 
-@pytest.mark.parametrize("joints", [(0.0,) * 6, (np.nan,) * 7, "ready", (None,) * 7])
+@pytest.mark.parametrize(
+    "joints", [(0.0,) * 6, (np.nan,) * 7, "ready", (None,) * 7, (10**400,) * 7]
+)
 def test_a_set_point_that_is_no_posture_is_rejected(iiwa, ready, joints):
     step = joint_session(iiwa, ready).step(Command(joints=joints))
     assert step.reason.startswith("command rejected: its set-point must be 7 finite numbers [rad]")

@@ -105,6 +105,7 @@ class TestBadInput:
             (Command(angular=(0, np.inf, 0)), "its angular velocity must be finite, and 100 rad/s"),
             (Command(linear=(0, 0, -1e9)), "its linear velocity must be finite, and 100 m/s at"),
             (Command(linear=(0, 0)), "its linear velocity must be 3 numbers [m/s]"),
+            (Command(linear=(10**400, 0, 0)), "its linear velocity must be 3 numbers [m/s]"),
             (Command(angular="fast"), "its angular velocity must be 3 numbers [rad/s]"),
             (
                 Command(mode="elbow"),
@@ -114,7 +115,18 @@ class TestBadInput:
             (Command(group=0, sign=2), "its sign must be -1, 0 or 1, not 2"),
             (Command(group=0, sign=np.nan), "its sign must be -1, 0 or 1, not nan"),
         ],
-        ids=["nan", "inf", "huge", "short", "text", "mode", "group", "sign", "nan sign"],
+        ids=[
+            "nan",
+            "inf",
+            "huge",
+            "short",
+            "enormous",
+            "text",
+            "mode",
+            "group",
+            "sign",
+            "nan sign",
+        ],
     )
     @pytest.mark.parametrize("mode", [Mode.END_EFFECTOR, Mode.NULL_SPACE, Mode.ASSISTED])
     def test_the_arm_holds_still_and_reports_the_reason(self, iiwa, ready, mode, command, said):

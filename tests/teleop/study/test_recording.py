@@ -122,6 +122,7 @@ def test_a_run_that_does_not_reach_the_end_counts_with_the_time_limit(recording)
         ({"robot": "panda"}, r"its robot is 'panda', but the next trial needs 'iiwa7'"),
         ({"line_end": [1.0, 0, 0]}, r"not recorded on the line of the study"),
         ({"line_start": "here"}, r"not recorded on the line of the study"),
+        ({"line_start": [10**400, 0, 0]}, r"not recorded on the line of the study"),
     ],
 )
 def test_runs_of_other_trials_are_refused(recording, metadata, message):
