@@ -13,6 +13,7 @@ import pickle
 import xml.etree.ElementTree as ElementTree
 import zlib
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import joblib
@@ -249,8 +250,7 @@ def joblib_mutated(content: bytes, rng: np.random.Generator) -> bytes:
         elif action == 1:
             array["type"] = pick(rng, ("u1", "u8", "f4", "f8", "O", "i8"))
         elif action == 2:
-            # 100 MB of zeros.
-            array["bytes"] = np.frombuffer(zlib.compress(bytes(10**8), 1), dtype=np.uint8)
+            array["bytes"] = _compressed_zeros()
             array["shape"] = [10**8 // int(array["type"][1])]
         else:
             array["bytes"] = _numbers_mutated(array, rng)
@@ -259,6 +259,12 @@ def joblib_mutated(content: bytes, rng: np.random.Generator) -> bytes:
     buffer = io.BytesIO()
     joblib.dump(tree, buffer)
     return zlib.compress(buffer.getvalue(), 0)
+
+
+@cache
+def _compressed_zeros() -> Any:
+    """Return the compressed bytes of 100 MB of zeros."""
+    return np.frombuffer(zlib.compress(bytes(10**8), 1), dtype=np.uint8)
 
 
 def _numbers_mutated(array: dict[str, Any], rng: np.random.Generator) -> Any:

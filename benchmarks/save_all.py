@@ -101,7 +101,8 @@ PARTS: dict[str, tuple[str, ...]] = {
     "kills": (),
     "fault_conditions": (),
     "edges": (),
-    "fuzz": ("--mutants", "5000"),
+    "campaign": ("--folder", "out/campaign"),
+    "fuzz": ("--mutants", "10000", "--score-every", "100"),
     "fuzz_options": (),
 }
 """Arguments of each script; those with times come first."""
