@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,13 +47,11 @@ def body_triangles(model: Urdf) -> dict[str, FloatArray]:
     return found
 
 
-@cache
 def _placed_triangles(geometries: tuple[Geometry, ...]) -> FloatArray:
     """Return the triangles of the geometries of a body in its frame [m], shape (n, 3, 3)."""
     pieces = [place(geometry_triangles(g), g.xyz, g.rpy) for g in geometries]
     # One mesh often is both visual and collision geometry.
     corners, _ = distinct(np.concatenate(pieces).reshape(-1, 9))
-    corners.setflags(write=False)
     return corners.reshape(-1, 3, 3)
 
 
