@@ -49,7 +49,8 @@ this times the square of a random number, so that some targets are near enough f
 BLOCKED = 0.1
 """What each blocked step from a node adds to its squared distance, as a fraction. Queries that take
 more than a thousand iterations without it take three quarters of the time; with 0.3 some, and with
-3 most of them take longer."""
+3 most of them take longer. In a scene as narrow everywhere as the benchmark's cage, queries take a
+third longer with it."""
 SHOULDER = 3
 """Joints that exclude most nodes as the nearest one by themselves: the arm reaches farthest from
 their axes."""

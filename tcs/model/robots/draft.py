@@ -72,7 +72,7 @@ class DraftOptions:
         collision_meshes: Whether the collision geometry of a link, if there is any, is its whole
             surface.
         ignore: Links that nothing is checked against.
-        jobs: Number of processes; does not change the results.
+        jobs: Number of processes that fit shapes and tighten them.
     """
 
     base: str | None = None
