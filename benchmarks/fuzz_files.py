@@ -275,29 +275,16 @@ def _read_model(path: Path) -> Any:
     return check_model_file(path, f"model '{path}'")
 
 
-def _forget_models() -> None:
-    """Clear the caches of models, which hold one answer for each path: mutants have the same."""
-    from tcs.model.robots import robot_file
-    from tcs.model.robots.urdf import read_urdf
-
-    read_urdf.cache_clear()
-    robot_file._model.cache_clear()
-
-
 def _read_robot(path: Path) -> Any:
     from tcs.model.robots import load_robot
 
-    _forget_models()
     return load_robot(path.parent / "iiwa7.yaml")
 
 
 def _read_mesh(path: Path) -> Any:
     from tcs.model.robots.urdf import read_urdf
-    from tcs.model.robots.urdf.meshes import mesh_triangles
     from tcs.model.robots.urdf.surfaces import body_triangles
 
-    _forget_models()
-    mesh_triangles.cache_clear()
     return body_triangles(read_urdf(path.with_name(f"{path.suffix[1:]}.urdf")))
 
 
@@ -371,7 +358,6 @@ def _urdf(path: Path, number: int) -> Scored:
     """Draft a robot from one URDF in ten, and build the scene of every one."""
     from tcs.model.robots.draft import draft_robot
 
-    _forget_models()
     if number % 10 == 0:
         draft_robot(str(path), "iiwa_link_ee_kuka")
     return _scene(path, number)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -13,6 +12,7 @@ from pydantic import Field, model_validator
 
 from tcs.errors import RobotError, UnknownNameError
 from tcs.files.documents import Clearance, Document, Entries, JointPosition, Placed, Size, checked
+from tcs.files.unchanged import kept_while_unchanged
 from tcs.model.robots.primitives import Primitive, quaternion_of_rpy, read_primitives
 from tcs.model.robots.urdf import WORLD, Urdf, read_urdf
 from tcs.model.robots.urdf.model import Mimic
@@ -366,7 +366,7 @@ class RobotFile(Document):
         return checked(self.model_dump() | given, RobotFile, f"robot '{self.name}'", RobotError)
 
 
-@cache
+@kept_while_unchanged(files=64)
 def _model(
     path: Path,
     mount: Mount | None,

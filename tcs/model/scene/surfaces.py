@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Joint
@@ -22,6 +23,8 @@ from tcs.model.robots.distances import (
     tables_in_force,
 )
 from tcs.model.scene.contacts import Group, Part
+
+FloatArray = NDArray[np.float64]
 
 ROUNDING = 1e-6
 """What rounding may change of joint angles [rad]: score files keep seven digits of them."""
@@ -48,6 +51,7 @@ class SurfaceContacts:
         # Bodies of the environment may have the same names.
         self._bodies = {p.name: p.body for p in parts if p.group is not Group.ENVIRONMENT}
         self._joints = dict(zip(robot.arm_joints, arm, strict=True))
+        self._surfaces: dict[str, FloatArray] = {}
 
     def distance(
         self, plant: MultibodyPlant, state: Context, first: str, second: str, required: float
@@ -69,10 +73,16 @@ class SurfaceContacts:
         if table is None or not self._shows(table, state, required):
             return None
         X_AB = self._pose(plant, state, first).inverse() @ self._pose(plant, state, second)
-        there = body_surface(self._robot, second)
+        there = self._surface(second)
         moved = there @ X_AB.rotation().matrix().T + X_AB.translation()
-        here = body_surface(self._robot, first)
+        here = self._surface(first)
         return surface_distance(here, np.asarray(moved), required + FARTHEST)
+
+    def _surface(self, body: str) -> FloatArray:
+        """Return the surface of a body in its frame [m], shape (n, 3, 3)."""
+        if body not in self._surfaces:
+            self._surfaces[body] = body_surface(self._robot, body)
+        return self._surfaces[body]
 
     def _pose(self, plant: MultibodyPlant, state: Context, body: str) -> RigidTransform:
         return plant.EvalBodyPoseInWorld(state, plant.get_body(self._bodies[body]))

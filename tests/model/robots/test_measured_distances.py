@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
+import time
 from dataclasses import replace
 
 import coal
@@ -366,6 +367,25 @@ def test_the_digest_is_of_what_meshes_hold_and_where_they_are(geometry, same, tm
     )
     other = robot.model_copy(update={"urdf": str(tmp_path / "ur5.urdf")})
     assert (source_digest(other, pair) == source_digest(robot, pair)) is same
+
+
+def test_tables_do_not_count_once_a_mesh_has_changed(tmp_path):
+    robot, pair, name = load_robot("ur5"), ("forearm_link", "wrist_2_link"), "wrist2.stl"
+    mesh = next(
+        g.mesh for g in surface_geometries(robot.model(), pair[1]) if str(g.mesh).endswith(name)
+    )
+    copy = tmp_path / name
+    copy.write_bytes(mesh.read_bytes())
+    text = robot.urdf_path().read_text()
+    (tmp_path / "ur5.urdf").write_text(
+        re.sub(rf'filename="[^"]*ur5/collision/{name}"', f'filename="{copy}"', text)
+    )
+    other = robot.model_copy(update={"urdf": str(tmp_path / "ur5.urdf")})
+    time.sleep(0.2)  # what is read of a file that has just changed is not kept
+    assert pair in {table.pair for table in tables_in_force(other)}
+    triangle = copy.read_bytes()[-50:]
+    copy.write_bytes(copy.read_bytes()[:-50] + triangle[12:24] + triangle[:12] + triangle[24:])
+    assert pair not in {table.pair for table in tables_in_force(other)}
 
 
 def test_the_digest_is_of_the_axes_of_joints(tmp_path):

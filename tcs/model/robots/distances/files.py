@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from tcs.errors import RobotError
+from tcs.files.unchanged import kept_while_unchanged
 from tcs.files.writing import whole_file
 from tcs.model.robots.distances.table import DistanceTable
 
@@ -41,6 +42,7 @@ def write_tables(path: Path, tables: Sequence[DistanceTable], source: str) -> No
         np.savez_compressed(stream, **arrays)
 
 
+@kept_while_unchanged(files=16)
 def read_tables(path: Path) -> tuple[DistanceTable, ...]:
     """Return the tables of a file.
 

@@ -15,7 +15,6 @@ from tcs.model.robots.robot_file import RobotFile
 _LOG = logging.getLogger(__name__)
 
 
-@lru_cache(maxsize=16)
 def tables_in_force(robot: RobotFile) -> tuple[DistanceTable, ...]:
     """Return the tables of a robot's file that were made from the meshes and joints at hand.
 
@@ -37,14 +36,20 @@ def tables_in_force(robot: RobotFile) -> tuple[DistanceTable, ...]:
     kept = [table for table in tables if _holds(robot, table)]
     others = [" / ".join(table.pair) for table in tables if table not in kept]
     if others:
-        _LOG.warning(
-            "Robot '%s': other meshes or joints than those of its tables of distances, '%s': the "
-            "shapes alone decide on contact of %s.",
-            robot.name,
-            robot.distances,
-            ", ".join(others),
-        )
+        _warn_once(robot.name, robot.distances, ", ".join(others))
     return tuple(kept)
+
+
+@lru_cache(maxsize=64)
+def _warn_once(robot: str, file: str, pairs: str) -> None:
+    """Say of which pairs the tables do not hold, once."""
+    _LOG.warning(
+        "Robot '%s': other meshes or joints than those of its tables of distances, '%s': the "
+        "shapes alone decide on contact of %s.",
+        robot,
+        file,
+        pairs,
+    )
 
 
 def _holds(robot: RobotFile, table: DistanceTable) -> bool:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Collection, Mapping
-from functools import cache, lru_cache
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import RobotError
+from tcs.files.unchanged import kept_while_unchanged
 from tcs.model.robots.extras import model_with_extras
 from tcs.model.robots.robot_file import RobotFile
 from tcs.model.robots.urdf import Joint, Urdf
@@ -46,7 +46,6 @@ def carried_bodies(model: Urdf, carriers: Collection[str]) -> Mapping[str, tuple
     return {carrier: tuple(bodies) for carrier, bodies in found.items()}
 
 
-@lru_cache(maxsize=32)
 def body_surface(robot: RobotFile, body: str) -> FloatArray:
     """Return the surface that the shapes of a body must enclose, in its frame [m], (n, 3, 3).
 
@@ -107,7 +106,7 @@ def _carrying(model: Urdf, body: str) -> list[Joint]:
     return joints
 
 
-@cache
+@kept_while_unchanged(files=256)
 def _content_digest(mesh: Path) -> str:
     """Return the SHA-256 of a mesh file."""
     try:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import io
 import os
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +15,7 @@ from tcs.errors import RobotError
 from tcs.files.paths import CACHE_ADVICE, cache_folder
 from tcs.files.quantities import SIZE
 from tcs.files.reading import read_bytes
+from tcs.files.unchanged import kept_while_unchanged
 from tcs.files.writing import whole_file
 from tcs.model.robots.urdf.collada import geometry_only
 
@@ -60,7 +60,7 @@ def as_obj(mesh: Path) -> Path:
     return target
 
 
-@cache
+@kept_while_unchanged(files=256)
 def mesh_triangles(mesh: Path) -> FloatArray:
     """Return the corners of every triangle of a mesh [unit of the mesh], shape (n, 3, 3).
 

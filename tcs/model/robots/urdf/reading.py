@@ -6,11 +6,11 @@ import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 
 from tcs.errors import RobotError, UnknownNameError
 from tcs.files.quantities import ANGLE, ENTRIES, EXTENT, JOINT_LIMIT, MESH_SCALE, POSITION
+from tcs.files.unchanged import kept_while_unchanged
 from tcs.files.xml_documents import read_xml
 from tcs.model.robots.urdf.model import MOVABLE, Geometry, Joint, Mimic, Urdf, Vector
 from tcs.model.robots.urdf.packages import resolve_uri
@@ -28,12 +28,12 @@ _XACRO = "{http://www.ros.org/wiki/xacro}"
 """XML namespace of the macros from which a URDF is generated."""
 
 
-@cache
+@kept_while_unchanged(files=64)
 def read_urdf(path: Path) -> Urdf:
     """Return the links and joints of a URDF file.
 
     Args:
-        path: The file; read once per process.
+        path: The file; read anew only if it has changed.
 
     Raises:
         RobotError: If the file cannot be read, is not a URDF, names a missing mesh, or its joints
