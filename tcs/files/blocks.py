@@ -171,14 +171,27 @@ def load_block(path: Path) -> StoredBlock:
         key, name = content.get("key"), content.get("block")
         if not isinstance(key, str) or not isinstance(name, str):
             raise StoreFormatError("has no key or name")
-        for part, value in content.items():
-            if isinstance(value, dict):
-                shape = value.get("shape")
-                lengths = len(shape) if isinstance(shape, list) else 0
-                decompress(content, part, str(value.get("type")), (None,) * lengths)
+        _read_arrays(content)
         return StoredBlock(key, name)
 
     return FORMAT.load(path, decode)
+
+
+def _read_arrays(content: Mapping[str, Any]) -> None:
+    """Decompress every array of a block, in containers within it too.
+
+    Raises:
+        StoreFormatError: If one is damaged.
+    """
+    for part, value in content.items():
+        if not isinstance(value, dict):
+            continue
+        if "bytes" not in value:
+            _read_arrays(value)
+            continue
+        shape = value.get("shape")
+        lengths = len(shape) if isinstance(shape, list) else 0
+        decompress(dict(content), part, str(value.get("type")), (None,) * lengths)
 
 
 @dataclass(frozen=True, slots=True)

@@ -80,7 +80,9 @@ def test_blocks_are_kept_and_taken(tcs_command, corner, corner_file, tmp_path):
         assert tcs_command(*words, *more).code == 0
         table, same = tcs.load(path).nominal.scores, tcs.load(corner_file).nominal.scores
         np.testing.assert_array_equal(table.dexterity, same.dexterity)
-        assert len(list(blocks.rglob("*.block"))) == 1
+        kept = sorted(blocks.rglob("*.block"))
+        assert sorted(block.name for block in kept) == ["0000000000.block", "sets.block"]
+    assert tcs_command("check", *blocks.rglob("manifest.json"), *kept).code == 0
     for words, told in [
         (("--restart",), "requires --blocks"),
         (("--blocks", blocks, "--observed", "person_x=0.01"), "not for an observed environment"),

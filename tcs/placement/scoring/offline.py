@@ -29,10 +29,11 @@ from tcs.placement.scoring.arms import score_arms
 from tcs.placement.scoring.engines import ScoringEngine
 from tcs.placement.scoring.hands import check_arms_are_free, score_hands
 from tcs.placement.scoring.job import Job, JobOptions, data_references, load_job, load_jobs
+from tcs.placement.scoring.kept_sets import kept_sets
 from tcs.placement.scoring.person import person_entry
 from tcs.placement.scoring.robot_shapes import robot_shapes
 from tcs.placement.scoring.self_contact import prevailing_self_contact
-from tcs.placement.scoring.sets import SetOptions, build_sets, checked_options
+from tcs.placement.scoring.sets import SetOptions, checked_options
 from tcs.placement.scoring.sweep import sweep
 from tcs.placement.store import ScoreFile, StateTables
 from tcs.placement.tables import ScoreTable
@@ -222,7 +223,7 @@ class ScoringSetup:
         job = self.job
         sets_begun = time.perf_counter()
         tables = tuple(
-            StateTables.of(table, build_sets(table, grid, jobs=self.jobs, **self.sets))
+            StateTables.of(table, kept_sets(self.blocks, table, grid, jobs=self.jobs, **self.sets))
             for table in scores
         )
         done = time.perf_counter()
