@@ -104,8 +104,8 @@ def times(works: Sequence[Work], repeats: int, jobs: int) -> None:
         row(f"{work.line}: scoring_seconds", spread(seconds))
         configurations = sum(table.configurations for table in scores[work])
         size = f"{configurations:,} x {scores[work][0].goals}"
-        cell("robots", work.line, "configurations x goals", size)
-        cell("robots", work.line, "scoring", spread(seconds))
+        cell("times", work.line, "configurations x goals", size)
+        cell("times", work.line, "scoring", spread(seconds))
 
 
 def finding(work: Work, options: argparse.Namespace) -> dict[str, Any]:
