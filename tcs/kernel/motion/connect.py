@@ -4,10 +4,7 @@ Edges of the trees are checked at postures only, and those of a path that they m
 where one is not, what has grown beyond it is removed, and the trees grow on (Bohlin, Kavraki 2000).
 Two trees grow, from the starts and from the goals. The smaller one takes a step towards a random
 posture; the other one is then extended to the new posture until it arrives or is blocked. The
-nearest node is the one from which the arm moves least: each joint counts by how far from its axis
-the arm reaches. Nodes from which steps were blocked count as farther away, so that those next to an
-obstacle, which are the nearest to all that is behind it, leave the growing to others (compare
-Yershova, Jaillet, Simeon, LaValle 2005, who limit the domain of such nodes).
+nearest node is the one from which the arm moves least, see `nearest`.
 """
 
 from __future__ import annotations
@@ -22,6 +19,7 @@ from tcs.kernel.motion.edges import (
     edge_seems_free,
     posture_is_free,
 )
+from tcs.kernel.motion.nearest import count_blocked, nearest, place_node
 from tcs.kernel.motion.random import uniform
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
 from tcs.kernel.motion.shortcut import cut_corners, drop_postures
@@ -46,14 +44,6 @@ SPREAD = 3.0
 """Greatest scale of these: the standard deviation of each joint is half of it [rad]. The scale is
 this times the square of a random number, so that some targets are near enough for a trapped tree.
 """
-BLOCKED = 0.1
-"""What each blocked step from a node adds to its squared distance, as a fraction. Queries that take
-more than a thousand iterations without it take three quarters of the time; with 0.3 some, and with
-3 most of them take longer. In a scene as narrow everywhere as the benchmark's cage, queries take a
-third longer with it."""
-SHOULDER = 3
-"""Joints that exclude most nodes as the nearest one by themselves: the arm reaches farthest from
-their axes."""
 DIRECT = 4
 """Pairs of start and goal, the nearest ones, that are connected directly if possible."""
 
@@ -141,13 +131,13 @@ def _grow_until_met(
         _draw_target(scene, trees, side)
         if max(trees.nodes[0], trees.nodes[1]) >= MOST_NODES:
             return -1
-        new = _grow(scene, work, trees, side, _nearest(scene, trees, side, target), target)
+        new = _grow(scene, work, trees, side, nearest(scene, trees, side, target), target)
         if new == NONE:
             continue
         for k in range(7):
             following[k] = trees.q[side, new, k]
         other = 1 - side
-        met = _nearest(scene, trees, other, following)
+        met = nearest(scene, trees, other, following)
         while met != NONE and distance(scene, trees.q[other, met], following) > SAME:
             if trees.nodes[other] >= MOST_NODES:
                 return -1
@@ -188,6 +178,7 @@ def _plant(trees: Trees, side: int, roots: FloatArray) -> None:
         trees.parent[side, n], trees.failures[side, n] = NONE, 0
         for k in range(7):
             trees.q[side, n, k] = roots[n, k]
+        place_node(trees, side, n)
     trees.nodes[side], trees.roots[side] = count, count
 
 
@@ -216,36 +207,6 @@ def _connect_directly(
 
 
 @inner
-def _nearest(scene: MotionScene, trees: Trees, side: int, target: FloatArray) -> int:
-    """Return the node of a tree from which the arm moves least to a posture.
-
-    Blocked steps from a node count as distance.
-    """
-    q, best, least = trees.q[side], 0, np.inf
-    for n in range(trees.nodes[side]):
-        square = 0.0
-        for k in range(SHOULDER):
-            square += _weighted_square(scene, q[n, k], target[k], k)
-        if square >= least:
-            continue
-        for k in range(SHOULDER, 7):
-            square += _weighted_square(scene, q[n, k], target[k], k)
-        square *= 1.0 + BLOCKED * trees.failures[side, n]
-        if square < least:
-            best, least = n, square
-    return best
-
-
-@inner
-def _weighted_square(scene: MotionScene, start: float, end: float, k: int) -> float:
-    """Return what the motion of joint k adds to a squared distance of postures."""
-    angle = end - start
-    if scene.period[k] > 0.0:
-        angle = difference(scene, start, end, k)
-    return scene.weight[k] * angle * angle
-
-
-@inner
 def _grow(
     scene: MotionScene, work: MotionWorkspace, trees: Trees, side: int, n: int, target: FloatArray
 ) -> int:
@@ -264,13 +225,14 @@ def _grow(
         q[new, k] = target[k] if reached else q[n, k] + fraction * angle
     if not posture_is_free(scene, work, q[new]):
         work.hits[work.contact[0]] += 1
-        trees.failures[side, n] += 1
+        count_blocked(trees, side, n)
         return NONE
     if not edge_seems_free(scene, work, q[n], q[new]):
-        trees.failures[side, n] += 1
+        count_blocked(trees, side, n)
         return NONE
     trees.parent[side, new], trees.certified[side, new] = n, 0
     trees.failures[side, new] = 0
+    place_node(trees, side, new)
     trees.nodes[side] += 1
     return new
 
@@ -328,6 +290,7 @@ def _remove(trees: Trees, side: int, n: int) -> None:
         certified[kept], failures[kept] = certified[m], failures[m]
         for k in range(7):
             q[kept, k] = q[m, k]
+        place_node(trees, side, kept)
         kept += 1
     trees.nodes[side] = kept
 

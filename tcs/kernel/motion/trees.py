@@ -16,6 +16,8 @@ MOST_NODES = 20_000
 MOST_POINTS = 1024
 """Capacity of a path."""
 NONE = -1
+CHUNK = 128
+"""Number of nodes whose distances one vector loop computes."""
 SAME = 1e-12
 """Greatest distance of two postures that are the same up to rounding of full turns [rad]."""
 
@@ -25,6 +27,12 @@ class Trees(NamedTuple):
 
     q: FloatArray
     """Postures [rad], shape (2, MOST_NODES, 7)."""
+    joint: FloatArray
+    """The same, joint by joint, for vector loops, shape (2, 7, MOST_NODES)."""
+    penalty: FloatArray
+    """Factor of the squared distance to each node for its blocked steps, shape (2, MOST_NODES)."""
+    square: FloatArray
+    """Scratch: squared distances of a chunk of nodes, shape (CHUNK,)."""
     parent: IntArray
     """Node that each node was extended from, NONE for a root, shape (2, MOST_NODES)."""
     nodes: IntArray
@@ -61,6 +69,9 @@ def new_trees(seed: int) -> Trees:
     """Return memory for a query."""
     return Trees(
         q=np.empty((2, MOST_NODES, 7)),
+        joint=np.empty((2, 7, MOST_NODES)),
+        penalty=np.empty((2, MOST_NODES)),
+        square=np.empty(CHUNK),
         parent=np.empty((2, MOST_NODES), np.int64),
         nodes=np.zeros(2, np.int64),
         roots=np.zeros(2, np.int64),
