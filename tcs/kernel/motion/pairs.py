@@ -20,7 +20,7 @@ from tcs.kernel.arrays import BOX, CAPSULE, FloatArray
 from tcs.kernel.cache import inner
 from tcs.kernel.collide import BOUND, CENTRE, ROTATION, SIZE, TYPE, closer, move, spheres_overlap
 from tcs.kernel.distances import distance_bound
-from tcs.kernel.kinematics import link_poses
+from tcs.kernel.motion.link_poses import place_links
 from tcs.kernel.motion.planes import TWISTED, plane_between
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
 from tcs.kernel.motion.tool_line import SEEN_FROM_TOOL, follows_line, line_motion, off_line
@@ -210,7 +210,7 @@ def take_posture(scene: MotionScene, work: MotionWorkspace) -> None:
     for k in range(7):
         if work.delta[k] > 0.0:
             work.posture[1] = 1
-    link_poses(scene.chain_R, scene.chain_p, work.q, work.link_R, work.link_p)
+    place_links(scene.chain_R, scene.chain_p, work.q, work.turns, work.link_R, work.link_p)
 
 
 @inner

@@ -9,6 +9,7 @@ import numpy as np
 from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
 from tcs.kernel.collide import BOUND, CENTRE, COLUMNS, ROTATION
 from tcs.kernel.distances import DistanceTables
+from tcs.kernel.motion.link_poses import LANES
 from tcs.kernel.problem import Problem
 
 FULL_TURN = 2.0 * np.pi
@@ -101,6 +102,8 @@ class MotionWorkspace(NamedTuple):
 
     q: FloatArray
     """Joint angles of the current posture [rad], shape (7,)."""
+    turns: FloatArray
+    """Scratch of `place_links`, shape (3, LANES)."""
     link_R: FloatArray
     """Orientations of A, L1..L7 in A, shape (8, 3, 3)."""
     link_p: FloatArray
@@ -319,6 +322,7 @@ def new_motion_workspace(scene: MotionScene) -> MotionWorkspace:
     shapes[arm:] = scene.fixed
     return MotionWorkspace(
         q=np.empty(7),
+        turns=np.zeros((3, LANES)),
         link_R=np.empty((8, 3, 3)),
         link_p=np.empty((8, 3)),
         shapes=shapes,

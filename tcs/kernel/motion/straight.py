@@ -8,8 +8,9 @@ import numpy as np
 
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant, jit
-from tcs.kernel.kinematics import fill_jacobian, link_poses, place_tool, pose_error
+from tcs.kernel.kinematics import fill_jacobian, place_tool, pose_error
 from tcs.kernel.motion.edges import curve_is_free
+from tcs.kernel.motion.link_poses import LANES, place_links
 from tcs.kernel.motion.scene import MOST_PIECES, MotionScene, MotionWorkspace
 from tcs.kernel.numeric.newton import (
     NewtonWorkspace,
@@ -42,6 +43,8 @@ class StraightWorkspace(NamedTuple):
 
     newton: NewtonWorkspace
     """Kinematics at one posture."""
+    turns: FloatArray
+    """Scratch of `place_links`, shape (3, LANES)."""
     R_AT: FloatArray
     """Orientation of the tool in A, the same all along, shape (3, 3)."""
     p_AT: FloatArray
@@ -59,6 +62,7 @@ def new_straight_workspace() -> StraightWorkspace:
     """Return scratch memory for one worker."""
     return StraightWorkspace(
         new_newton_workspace(),
+        np.zeros((3, LANES)),
         np.empty((3, 3)),
         np.empty(3),
         np.empty(3),
@@ -100,7 +104,7 @@ def straight_motion(
     """
     scene, work, line = unowned(owned_scene), unowned(owned_work), unowned(owned_line)
     newton, last = line.newton, len(points) - 1
-    link_poses(scene.chain_R, scene.chain_p, q, newton.link_R, newton.link_p)
+    place_links(scene.chain_R, scene.chain_p, q, line.turns, newton.link_R, newton.link_p)
     place_tool(scene.chain_R, scene.chain_p, newton.link_R, newton.link_p, line.R_AT, line.p_AT)
     for k in range(7):
         points[0, k], line.locked[k] = q[k], 0
@@ -181,7 +185,7 @@ def error_between(
 def _error_on_line(scene: MotionScene, line: StraightWorkspace, q: FloatArray) -> float:
     """Fill link poses and pose error at joint angles q; return the error [rad and m]."""
     newton = line.newton
-    link_poses(scene.chain_R, scene.chain_p, q, newton.link_R, newton.link_p)
+    place_links(scene.chain_R, scene.chain_p, q, line.turns, newton.link_R, newton.link_p)
     place_tool(scene.chain_R, scene.chain_p, newton.link_R, newton.link_p, newton.R_AT, newton.p_AT)
     return pose_error(newton.R_AT, newton.p_AT, line.R_AT, line.target, newton.error)
 
