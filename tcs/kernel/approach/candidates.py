@@ -10,8 +10,8 @@ from tcs.kernel.approach.grid import NOWHERE, take_path
 from tcs.kernel.approach.memory import MOST_CURVES, Approach
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, int_constant
-from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.kinematics import copy_joints
+from tcs.kernel.motion.scene import NO_PAIR
 from tcs.kernel.motion.straight import DONE
 from tcs.kernel.problem import Problem
 
@@ -34,11 +34,11 @@ def follow_candidates(problem: Problem, approach: Approach, fastest: FloatArray)
             if not _seems_free(problem, approach, b, i):
                 close_goal(approach, b, i)
                 continue
-            if columns[6] == 1 and _climb(problem, approach, fastest, b, i):
+            if columns[5] == 1 and _climb(problem, approach, fastest, b, i):
                 return True
         if follow(problem, approach, fastest, b, i, False) == DONE:
             copy_joints(approach.curve.points[0], search.best)
-            if rank > 0 and columns[6] == 0:
+            if rank > 0 and columns[5] == 0:
                 _climb(problem, approach, fastest, b, i)
             return True
         if columns[4] > MOST_CURVES:
@@ -134,12 +134,12 @@ def _seems_free(problem: Problem, approach: Approach, b: int, column: int) -> bo
     if grid.onward[b, 0, column] == NOWHERE:
         return False
     take_path(grid, b, column)
-    if columns[6] == 1 and path_touches(
+    if columns[5] == 1 and path_touches(
         problem.arm, approach.scene, approach.motion, grid, approach.curve, b, approach.offset
     ):
         return False
     if not grid.is_free[b, 0, column]:
-        if contact_at(problem, approach, b, column, AT_GOAL) != NO_CONTACT:
+        if contact_at(problem, approach, b, column, AT_GOAL) != NO_PAIR:
             return False
         grid.is_free[b, 0, column] = True
     return True

@@ -5,19 +5,14 @@ from __future__ import annotations
 from tcs.kernel.analytic.ik import sample_joints
 from tcs.kernel.approach.curve import fill_spline, path_touches, spline_is_free
 from tcs.kernel.approach.grid import NOWHERE, PIECES, close_node, column_at, take_path
-from tcs.kernel.approach.memory import ENOUGH, MOST_CURVES, UNKNOWN, Approach
+from tcs.kernel.approach.memory import ENOUGH, MOST_CURVES, Approach
 from tcs.kernel.approach.scene import pair_contact_code
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner
-from tcs.kernel.contacts import (
-    NO_CONTACT,
-    arm_contact,
-    gripper_body_contact,
-    pair_touches,
-    place_coupled_links,
-    place_gripper,
-)
-from tcs.kernel.kinematics import link_poses
+from tcs.kernel.contacts import NO_CONTACT
+from tcs.kernel.motion.edges import is_free_here
+from tcs.kernel.motion.pairs import is_near, take_posture
+from tcs.kernel.motion.scene import NO_PAIR, MotionScene
 from tcs.kernel.motion.straight import BLOCKED, DONE, LIMITS
 from tcs.kernel.problem import Problem
 
@@ -60,7 +55,7 @@ def follow(
     outcome = CLOSED
     while grid.onward[b, 0, column] != NOWHERE and columns[4] <= MOST_CURVES:
         take_path(grid, b, column)
-        if columns[6] == 1 and path_touches(
+        if columns[5] == 1 and path_touches(
             problem.arm, scene, motion, grid, curve, b, approach.offset
         ):
             outcome = BLOCKED
@@ -71,7 +66,7 @@ def follow(
             i = column_at(grid, b, column, level)
             close_node(grid, b, level, i, columns[0], columns[1])
             continue
-        level, contact = _first_contact(problem, approach, b, column)
+        level, k = _first_contact(problem, approach, b, column)
         is_at_level = level != NOWHERE
         # A contact counts on lines only that limits allow.
         if level == NOWHERE or (level > 0 and approach.contact[0] == NO_CONTACT):
@@ -84,23 +79,18 @@ def follow(
                 outcome = DONE
                 break
             level, k = curve.blocked[0], curve.blocked[1]
-            contact = pair_contact_code(problem, scene, k)
-            if scene.pair[k, 2] == 0 and scene.link_frame[scene.pair[k, 0]] == GRIPPER:
-                approach.contact[0], columns[4] = contact, ENOUGH
-                outcome = BLOCKED
-                break
-        approach.columns[7] = level
+        columns[6] = level
         if level > 0:
             outcome = BLOCKED
-            if approach.contact[0] == NO_CONTACT:
-                approach.contact[0] = contact
-            if approach.gripper[level] >= 0:
+            if approach.contact[0] == NO_CONTACT or _is_of_gripper(scene, k):
+                approach.contact[0] = pair_contact_code(problem, scene, k)
+            if _is_of_gripper(scene, k):
                 columns[4] = ENOUGH
                 break
         i = column_at(grid, b, column, level)
         close_node(grid, b, level, i, columns[0], columns[1])
-        if is_at_level and approach.gripper[level] == NO_CONTACT:
-            _close_beside(problem, approach, b, level, i)
+        if is_at_level:
+            _close_beside(problem, approach, b, level, i, k)
     if outcome != DONE:
         close_goal(approach, b, column)
     return outcome
@@ -122,9 +112,17 @@ def _fill_spline(problem: Problem, approach: Approach, fastest: FloatArray, b: i
 
 
 @inner
-def _close_beside(problem: Problem, approach: Approach, b: int, level: int, column: int) -> None:
-    """Close the nodes beside one in contact in which the same two shapes touch."""
-    grid, columns = approach.grid, approach.columns
+def _is_of_gripper(scene: MotionScene, k: int) -> bool:
+    """Return whether a pair is of the gripper and something fixed, the same from every posture."""
+    return scene.pair[k, 2] == 0 and scene.link_frame[scene.pair[k, 0]] == GRIPPER
+
+
+@inner
+def _close_beside(
+    problem: Problem, approach: Approach, b: int, level: int, column: int, k: int
+) -> None:
+    """Close the nodes beside one in contact in which the same pair k touches."""
+    grid, columns, motion = approach.grid, approach.columns, approach.motion
     for side in range(2):
         i, step = column, 2 * side - 1
         for _ in range(WIDEST):
@@ -133,24 +131,23 @@ def _close_beside(problem: Problem, approach: Approach, b: int, level: int, colu
                 not 0 <= i < columns[0]
                 or not grid.is_open[b, level, i]
                 or grid.is_free[b, level, i]
-                or not _last_touches(problem, approach, b, i, level)
             ):
+                break
+            _take_node(problem, approach, b, i, level)
+            take_posture(approach.scene, motion)
+            if not is_near(approach.scene, motion, k, False):
                 break
             close_node(grid, b, level, i, columns[0], columns[1])
 
 
 @inner
-def _last_touches(problem: Problem, approach: Approach, b: int, i: int, level: int) -> bool:
-    """Return whether the two shapes found in contact last touch at a node of the grid."""
-    work, grid, q = approach.work, approach.grid, approach.search.q
+def _take_node(problem: Problem, approach: Approach, b: int, i: int, level: int) -> None:
+    """Fill `motion.q` with the posture of a node of the grid; no joint moves."""
+    arm, grid, motion = problem.arm, approach.grid, approach.motion
     angle = grid.origin[0] + i * grid.origin[1]
-    sample_joints(problem.arm, grid.goal[level], problem.arm.branches[b], angle, q)
-    link_poses(problem.chain_R, problem.chain_p, q, work.link_R, work.link_p)
-    if len(problem.coupled):
-        place_coupled_links(problem, work, q)
-    partner, first, second = work.last[0], work.last[1], work.last[2]
-    body_A = problem.body_A[approach.columns[5]]
-    return partner >= 0 and pair_touches(problem, work, body_A, q, partner, first, second)
+    sample_joints(arm, grid.goal[level], arm.branches[b], angle, motion.q)
+    for k in range(7):
+        motion.delta[k] = 0.0
 
 
 @inner
@@ -162,7 +159,7 @@ def close_goal(approach: Approach, b: int, column: int) -> None:
 
 @inner
 def _first_contact(problem: Problem, approach: Approach, b: int, column: int) -> tuple[int, int]:
-    """Return a level at which the path from a column is in contact, or NOWHERE, and the contact.
+    """Return a level at which the path from a column is in contact, or NOWHERE, and the pair.
 
     Until a contact is known, most paths are free, and only the goal is checked.
     """
@@ -170,31 +167,21 @@ def _first_contact(problem: Problem, approach: Approach, b: int, column: int) ->
     levels = 1 if approach.contact[0] == NO_CONTACT else PIECES + 2
     for n in range(levels):
         # The goal, then where a line was blocked last, then from the begin of the approach on.
-        level = 0 if n == 0 else (approach.columns[7] if n == 1 else PIECES + 2 - n)
+        level = 0 if n == 0 else (approach.columns[6] if n == 1 else PIECES + 2 - n)
         i = column_at(grid, b, column, level)
         if grid.is_free[b, level, i]:
             continue
-        contact = contact_at(problem, approach, b, i, level)
-        if contact != NO_CONTACT:
-            return level, contact
+        k = contact_at(problem, approach, b, i, level)
+        if k != NO_PAIR:
+            return level, k
         grid.is_free[b, level, i] = True
-    return NOWHERE, NO_CONTACT
+    return NOWHERE, NO_PAIR
 
 
 @inner
 def contact_at(problem: Problem, approach: Approach, b: int, i: int, level: int) -> int:
-    """Return the contact of a node of the grid, or NO_CONTACT."""
-    work, grid, q, gripper = approach.work, approach.grid, approach.search.q, approach.gripper
-    body_A = problem.body_A[approach.columns[5]]
-    for r in range(3):
-        work.p_AG[r] = approach.curve.line.p_AT[r] + level / PIECES * approach.offset[r]
-    if gripper[level] == UNKNOWN:
-        gripper[level] = gripper_body_contact(problem, work, body_A)
-    elif gripper[PIECES + 1] != level:
-        place_gripper(problem, work, work.R_AG, work.p_AG)
-    gripper[PIECES + 1] = level
-    if gripper[level] != NO_CONTACT:
-        return gripper[level]
-    angle = grid.origin[0] + i * grid.origin[1]
-    sample_joints(problem.arm, grid.goal[level], problem.arm.branches[b], angle, q)
-    return arm_contact(problem, work, body_A, q)
+    """Return a pair in contact at a node of the grid, or NO_PAIR."""
+    _take_node(problem, approach, b, i, level)
+    if is_free_here(approach.scene, approach.motion):
+        return NO_PAIR
+    return approach.motion.contact[0]

@@ -13,7 +13,7 @@ import numpy as np
 
 from tcs.kernel.analytic.ik import wrist_goal
 from tcs.kernel.analytic.samples import MAX_SAMPLES
-from tcs.kernel.analytic.scratch import Search, fill_samples, measure_feasible, solve
+from tcs.kernel.analytic.scratch import Search, best_of, fill_samples, measure_feasible, solve
 from tcs.kernel.analytic.solver import ArmSolver
 from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant
@@ -50,6 +50,8 @@ class LineGrid(NamedTuple):
     """First and last column in which nodes may be open, shape (BRANCHES, PIECES + 1, 2)."""
     deepest: IntArray
     """Last level with open nodes of each branch, or NOWHERE, shape (BRANCHES,)."""
+    slack: FloatArray
+    """Greatest slack at the level after that, shape (BRANCHES,)."""
     measure: FloatArray
     """Measure of the nodes at the goal, shape (BRANCHES, MAX_SAMPLES)."""
     origin: FloatArray
@@ -73,6 +75,7 @@ def new_grid() -> LineGrid:
         np.zeros(MAX_SAMPLES, np.int64),
         np.zeros((BRANCHES, PIECES + 1, 2), np.int64),
         np.zeros(BRANCHES, np.int64),
+        np.zeros(BRANCHES),
         np.zeros((BRANCHES, MAX_SAMPLES)),
         np.empty(2),
         np.empty(PIECES + 1),
@@ -153,7 +156,7 @@ def open_levels(
     Args:
         arm: The arm.
         search: Scratch.
-        grid: `is_open` is filled, and `measure` at the goal.
+        grid: `is_open`, `spans`, `deepest` and `slack` are filled, and `measure` at the goal.
         b: The branch.
         columns: Number of columns.
         most: Greatest number of columns that the free joint moves from level to level.
@@ -186,6 +189,7 @@ def open_levels(
                 if level == 0:
                     grid.measure[b, first + i] = search.measure[i]
         if high == NOWHERE:
+            grid.slack[b] = search.slack[best_of(search.slack, count)]
             return False
         grid.deepest[b] = level
         grid.spans[b, level, 0], grid.spans[b, level, 1] = low, high

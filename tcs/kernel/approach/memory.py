@@ -8,7 +8,7 @@ import numpy as np
 
 from tcs.kernel.analytic.scratch import Search, new_search
 from tcs.kernel.approach.curve import CurveWorkspace, new_curve
-from tcs.kernel.approach.grid import PIECES, LineGrid, new_grid
+from tcs.kernel.approach.grid import LineGrid, new_grid
 from tcs.kernel.approach.scene import LineScene
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.contacts import Workspace, new_workspace
@@ -19,8 +19,6 @@ MOST_CURVES = 100
 """Greatest number of motions that are followed for a pair."""
 ENOUGH = 1_000_000
 """In place of the number of motions: no other can be free."""
-UNKNOWN = -2
-"""In place of a contact: not looked at yet."""
 
 
 class Approach(NamedTuple):
@@ -40,14 +38,11 @@ class Approach(NamedTuple):
     """Motion of the tool from the goal to the begin of the approach, in A [m], shape (3,)."""
     columns: IntArray
     """Number of columns of the grid, and of those that the free joint moves from level to level;
-    column and branch of the posture that scoring found; number of motions followed; torso level; 1
-    if lines are looked at first where others were blocked; level at which a line was blocked last;
-    shape (8,)."""
+    column and branch of the posture that scoring found; number of motions followed; 1 if lines are
+    looked at first where others were blocked; level at which a line was blocked last; shape (7,).
+    """
     known: FloatArray
     """Measure of the posture that scoring found, shape (1,)."""
-    gripper: IntArray
-    """Contact of the gripper with the robot's body at each level, as a code, or UNKNOWN: it is the
-    same for all postures; then the level at which the gripper is placed; shape (PIECES + 2,)."""
     contact: IntArray
     """First contact that blocked a motion, as a code, shape (1,)."""
 
@@ -65,8 +60,7 @@ def new_approach(problem: Problem, lines: LineScene) -> Approach:
         new_motion_workspace(scene),
         new_curve(),
         np.empty(3),
-        np.zeros(8, np.int64),
+        np.zeros(7, np.int64),
         np.zeros(1),
-        np.zeros(PIECES + 2, np.int64),
         np.zeros(1, np.int64),
     )

@@ -21,7 +21,7 @@ from tcs.kernel.approach.grid import (
     place_fine_columns,
     place_levels,
 )
-from tcs.kernel.approach.memory import ENOUGH, UNKNOWN, Approach
+from tcs.kernel.approach.memory import ENOUGH, Approach
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner
 from tcs.kernel.contacts import NO_CONTACT
@@ -79,7 +79,7 @@ def approach_pair(problem: Problem, approach: Approach, fastest: FloatArray, q: 
                 break
             columns[0], columns[4] = place_columns(arm, approach.grid, angle), 0
         if shift == SHIFTS - 1:
-            columns[6] = 0
+            columns[5] = 0
         if _search(problem, approach, fastest):
             return REACHED
         if approach.contact[0] == NO_CONTACT:
@@ -143,25 +143,67 @@ def _search_narrow(problem: Problem, approach: Approach, fastest: FloatArray) ->
             low = high = column
         elif high - low >= NARROW:
             continue
-        angle, spacing = first + 0.5 * (low + high) * step, step
-        for _ in range(TIMES):
-            spacing /= FINE
-            _place_fine(arm, approach, fastest, angle, spacing)
-            if level < PIECES and not _may_open(arm, approach, b, level + 1):
+        if level < PIECES and not _may_hide(grid.slack[b], step):
+            continue
+        angle = first + 0.5 * (low + high) * step
+        if _follow_narrow(problem, approach, fastest, b, level, angle, step):
+            return True
+    return False
+
+
+@inner
+def _follow_narrow(
+    problem: Problem,
+    approach: Approach,
+    fastest: FloatArray,
+    b: int,
+    level: int,
+    angle: float,
+    spacing: float,
+) -> bool:
+    """Search a branch around an angle of its last open level, at finer and finer spacings.
+
+    Args:
+        problem: The scene.
+        approach: As for `approach_pair`; `search.best` is filled if a node is approachable.
+        fastest: As for `approach_pair`.
+        b: The branch.
+        level: Its last open level.
+        angle: Middle of the window there [rad].
+        spacing: Usual spacing of the columns [rad].
+
+    Returns:
+        Whether a node is approachable.
+    """
+    arm, grid, columns = problem.arm, approach.grid, approach.columns
+    for _ in range(TIMES):
+        spacing /= FINE
+        _place_fine(arm, approach, fastest, angle, spacing)
+        low = high = NOWHERE
+        if level < PIECES:
+            slack = _greatest_slack(arm, approach, b, level + 1)
+            if not _may_hide(slack, spacing):
                 break
+            if slack < 0.0:
+                low, high = _window(arm, approach, b, level)
+        if low == NOWHERE:
             for other in range(len(arm.branches)):
                 for i in range(columns[0]):
                     grid.onward[other, 0, i] = NOWHERE
             if _open(problem, approach, b, 0, columns[0] - 1):
-                if follow_candidates(problem, approach, fastest):
-                    return True
-                break
+                return follow_candidates(problem, approach, fastest)
             level = grid.deepest[b]
             if level == NOWHERE:
                 break
             low, high = grid.spans[b, level, 0], grid.spans[b, level, 1]
-            angle = grid.origin[0] + 0.5 * (low + high) * spacing
+        angle = grid.origin[0] + 0.5 * (low + high) * spacing
     return False
+
+
+@inner
+def _may_hide(slack: float, spacing: float) -> bool:
+    """Return whether a window may be hidden between columns of a greatest slack."""
+    return slack > -STEEPEST * spacing
 
 
 @inner
@@ -178,8 +220,8 @@ def _found_again(problem: Problem, approach: Approach, fastest: FloatArray) -> i
 
 
 @inner
-def _may_open(arm: ArmSolver, approach: Approach, b: int, level: int) -> bool:
-    """Return whether a node of a level is open, or a window may be hidden between the columns."""
+def _greatest_slack(arm: ArmSolver, approach: Approach, b: int, level: int) -> float:
+    """Return the greatest slack of the columns at a level; fills those of `search`."""
     search, grid, count = approach.search, approach.grid, approach.columns[0]
     first, spacing = grid.origin[0], grid.origin[1]
     fill_samples(search, first, first + max(count - 1, 1) * spacing, max(count, TWO))
@@ -187,7 +229,18 @@ def _may_open(arm: ArmSolver, approach: Approach, b: int, level: int) -> bool:
         for c in range(3):
             search.goal[r, c] = grid.goal[level, r, c]
     solve(arm, search, b, count)
-    return bool(search.slack[best_of(search.slack, count)] > -STEEPEST * spacing)
+    return float(search.slack[best_of(search.slack, count)])
+
+
+@inner
+def _window(arm: ArmSolver, approach: Approach, b: int, level: int) -> tuple[int, int]:
+    """Return the first and the last column that is open at a level, NOWHERE without one."""
+    low = high = NOWHERE
+    if _greatest_slack(arm, approach, b, level) >= 0.0:
+        for i in range(approach.columns[0]):
+            if approach.search.slack[i] >= 0.0:
+                low, high = i if low == NOWHERE else low, i
+    return low, high
 
 
 @inner
@@ -219,7 +272,7 @@ def follow_posture(problem: Problem, approach: Approach, fastest: FloatArray, q:
     """
     _prepare(problem, approach, fastest, q)
     b, columns, grid, arm = approach.columns[3], approach.columns, approach.grid, problem.arm
-    columns[6] = 0
+    columns[5] = 0
     angle, spacing, outcome = q[arm.free], grid.origin[1], CLOSED
     centre = angle
     for n in range(TIMES + 1):
@@ -266,11 +319,8 @@ def _prepare(problem: Problem, approach: Approach, fastest: FloatArray, q: Float
     columns[0] = place_columns(arm, grid, angle)
     columns[1] = _most_columns(arm, grid, fastest)
     columns[2] = int((angle - grid.origin[0]) / grid.origin[1] + 0.5)
-    columns[3], columns[4], columns[6], columns[7] = 0, 0, 1, 0
+    columns[3], columns[4], columns[5], columns[6] = 0, 0, 1, 0
     approach.contact[0] = NO_CONTACT
-    for level in range(PIECES + 1):
-        approach.gripper[level] = UNKNOWN
-    approach.gripper[PIECES + 1] = NOWHERE
     least = np.inf
     for b in range(len(arm.branches)):
         sample_joints(arm, grid.goal[0], arm.branches[b], angle, search.q)

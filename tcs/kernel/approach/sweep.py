@@ -15,6 +15,7 @@ from tcs.kernel.base_pose import environment_in_arm_base, goal_in_arm_base, plac
 from tcs.kernel.cache import inner, jit
 from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.dexterity.measures import measure_at, rounded_inward
+from tcs.kernel.motion.scene import NO_PAIR
 from tcs.kernel.motion.straight import DONE
 from tcs.kernel.problem import Problem
 from tcs.kernel.scores import APPROACH_BLOCKED, REACHED
@@ -47,7 +48,7 @@ class ReachedPairs(NamedTuple):
 
 
 def score_approaches(
-    problem: Problem, lines: ApproachLines, pairs: ReachedPairs, scene: LineScene | None = None
+    problem: Problem, lines: ApproachLines, pairs: ReachedPairs, memory: Approach | None = None
 ) -> None:
     """Replace the scores of reached pairs by those with approach.
 
@@ -55,13 +56,14 @@ def score_approaches(
         problem: The scene, its goals and its grid; an arm with a closed form.
         lines: The approaches of the goals.
         pairs: The scores; replaced.
-        scene: The `approach_scene` of the problem, which takes a tenth of a second to make.
+        memory: Made by `new_approach`, and used by no other thread; None makes it, and the
+            `approach_scene` of the problem, which takes a tenth of a second.
     """
-    scene = approach_scene(problem) if scene is None else scene
+    # Referred to here to outlive the call: the compiled code takes unowned views of these arrays.
+    memory = new_approach(problem, approach_scene(problem)) if memory is None else memory
     # Other orders in memory are other types, for which the code would be compiled anew.
     pairs = pairs._replace(pair=np.ascontiguousarray(pairs.pair, dtype=np.int64))
-    # Allocated here to outlive the call: the compiled code takes unowned views of these arrays.
-    _score_approaches(problem, new_approach(problem, scene), lines, pairs)
+    _score_approaches(problem, memory, lines, pairs)
 
 
 def approach_spline(
@@ -122,7 +124,6 @@ def _place_surroundings(problem: Problem, approach: Approach, torso: int) -> Non
         problem, approach.work, torso, approach.scene, approach.boxes, approach.moving,
         approach.motion,
     )  # fmt: skip
-    approach.columns[5] = torso
 
 
 @inner
@@ -133,7 +134,7 @@ def _place_goal(
     work = approach.work
     goal_in_arm_base(problem, work, state, torso, g)
     # No result may depend on the pairs before, whose shapes are no longer in place.
-    work.last[0] = -1
+    approach.motion.contact[0] = NO_PAIR
     for r in range(3):
         approach.offset[r] = 0.0
         for c in range(3):

@@ -32,6 +32,8 @@ much more clearance than required."""
 PIECE = 0.2
 """Motion [m] of the pieces into which a curve is divided first: on longer ones most pairs may
 meet."""
+FIRST_PARTS = 2
+"""Number of parts of a curve of several pieces."""
 GOLDEN = 0.382
 """Step from one of these postures to the next, as a fraction of the edge: the golden section
 spreads the first of them evenly, however many there are."""
@@ -45,11 +47,11 @@ def posture_is_free(scene: MotionScene, work: MotionWorkspace, q: FloatArray) ->
     """Return whether nothing touches at joint angles q; fills `contact` if something does."""
     for k in range(7):
         work.q[k] = q[k]
-    return _is_free_here(scene, work)
+    return is_free_here(scene, work)
 
 
 @inner
-def _is_free_here(scene: MotionScene, work: MotionWorkspace) -> bool:
+def is_free_here(scene: MotionScene, work: MotionWorkspace) -> bool:
     """Return whether nothing touches at `work.q`; fills `contact` if something does.
 
     The last pair in contact is checked first.
@@ -117,7 +119,7 @@ def edge_seems_free(
         if n > 0:
             for k in range(7):
                 work.q[k] = start[k] + (end[k] - start[k]) * (n / parts)
-            if not _is_free_here(scene, work):
+            if not is_free_here(scene, work):
                 work.hits[work.contact[0]] += 1
                 return False
         n = (n + stride) % parts
@@ -161,7 +163,9 @@ def curve_is_free(scene: MotionScene, work: MotionWorkspace, at_end: bool) -> bo
     for k in range(7):
         moved += work.delta[k] * scene.reach[k]
     # A curve of several pieces is halved as they are.
-    parts = int(np.ceil(moved / PIECE)) if moved > PIECE and work.pieces[0] == 1 else 1
+    parts = min(FIRST_PARTS, work.pieces[0])
+    if work.pieces[0] == 1 and moved > PIECE:
+        parts = int(np.ceil(moved / PIECE))
     for n in range(parts):
         begin, end = n / parts, (n + 1) / parts
         _take_piece(scene, work, begin, end)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from tcs.kernel.arrays import BOX
 from tcs.kernel.cache import inner
-from tcs.kernel.collide import CENTRE
+from tcs.kernel.collide import CENTRE, SIZE, TYPE
+from tcs.kernel.motion.leaf_spheres import compare_spheres
 from tcs.kernel.motion.pairs import is_of_groups, may_touch_on_piece, place_shape
-from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
+from tcs.kernel.motion.scene import NO_PAIR, MotionScene, MotionWorkspace
 
 FAR = 0.25
 """Motion relative to the size of a pair of groups above which the piece is halved first."""
@@ -37,12 +39,58 @@ def list_near(scene: MotionScene, work: MotionWorkspace, extra: float, most: int
             if any_overlap(scene, work, i, first, end, apart):
                 for k in range(first, end):
                     if count < most and overlaps(scene, work, i, k, apart):
-                        count = append_near(scene, work, k, k + 1, extra, count, most)
+                        if has_leaves(scene, k):
+                            count = _append_leaves(scene, work, k, extra, count, most)
+                        else:
+                            count = append_near(scene, work, k, k + 1, extra, count, most)
             first = end
         if count < most:
             count = append_near(scene, work, moving, last, extra, count, most)
         if count == most:
             return count
+    return count
+
+
+@inner
+def has_leaves(scene: MotionScene, k: int) -> bool:
+    """Return whether pair k, always checked, is of a box around a link and a single fixed shape."""
+    i, fixed = scene.pair[k, 0], scene.pair[k, 1] - len(scene.links)
+    return scene.leaves[i, 0] < scene.leaves[i, 1] and fixed < scene.leaf_pair.shape[1]
+
+
+@inner
+def _append_leaves(
+    scene: MotionScene, work: MotionWorkspace, k: int, extra: float, count: int, most: int
+) -> int:
+    """Append the pairs of a link's shapes and a fixed shape that may touch to `work.pairs`.
+
+    Where the box around the link moves far for its size, its pair is appended by `append_below`.
+
+    Args:
+        scene: The scene.
+        work: Scratch, with the current posture; the shapes of pair k are placed.
+        k: A pair with leaves.
+        extra: Added to the gap of each pair [m].
+        count: Number of pairs listed already.
+        most: Number of pairs after which to stop.
+
+    Returns:
+        Number of pairs listed.
+    """
+    i, j, shapes = scene.pair[k, 0], scene.pair[k, 1], work.shapes
+    moved, first, last = work.motion[i, 0], scene.leaves[i, 0], scene.leaves[i, 1]
+    if not may_touch_on_piece(scene, work, k, moved, extra):
+        return count
+    if moved > FAR * scene.bound[k]:
+        return append_below(scene, work, k, moved, extra, count, most)
+    apart = scene.gap[k] + extra + moved + (0.0 if shapes[j, TYPE] == BOX else shapes[j, SIZE])
+    if compare_spheres(scene, work, k, apart, first, last) > 0:
+        for n in range(first, last):
+            m = scene.leaf_pair[n, j - len(scene.links)]
+            if work.excess[n - first] < 0.0 and m != NO_PAIR:
+                count = append_near(scene, work, m, m + 1, extra, count, most)
+                if count == most:
+                    break
     return count
 
 
@@ -100,7 +148,7 @@ def append_near(
 
     Args:
         scene: The scene.
-        work: Scratch, with the current posture; the shapes of the pairs are placed.
+        work: Scratch, with the current posture; the second shapes of the pairs are placed.
         first: First pair.
         last: One after the last pair.
         extra: Added to the gap of each pair [m].
@@ -108,6 +156,7 @@ def append_near(
         most: Number of pairs after which to stop.
     """
     for k in range(first, last):
+        place_shape(scene, work, scene.pair[k, 0])
         moved = work.motion[scene.pair[k, 0], scene.pair[k, 2]]
         if may_touch_on_piece(scene, work, k, moved, extra):
             count = append_below(scene, work, k, moved, extra, count, most)

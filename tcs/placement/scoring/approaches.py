@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from dataclasses import dataclass
 from functools import cached_property
@@ -120,6 +121,7 @@ class ApproachScorer:
         Returns:
             Arm joints of the pairs that remain reached [rad].
         """
+        from tcs.kernel.approach.memory import Approach, new_approach
         from tcs.kernel.approach.sweep import ReachedPairs, score_approaches
 
         found_pairs = (
@@ -127,7 +129,14 @@ class ApproachScorer:
         )
         pairs = np.concatenate([np.empty((0, 2), np.int64), *found_pairs])
         rows, columns = pairs.T
-        scene = self.scene
+        scene, of_thread = self.scene, threading.local()
+
+        def memory() -> Approach:
+            """Return the memory of this thread, whose pages take as long as 30 pairs to touch."""
+            if not hasattr(of_thread, "memory"):
+                of_thread.memory = new_approach(self.problem, scene)
+            found: Approach = of_thread.memory
+            return found
 
         def part(start: int) -> ReachedPairs:
             chosen = slice(start, start + SLICE)
@@ -136,7 +145,7 @@ class ApproachScorer:
                 pairs[chosen], reason[at], contact[at].astype(np.int32), dexterity[at],
                 joints[chosen].copy(),
             )  # fmt: skip
-            score_approaches(self.problem, self.lines, scores, scene)
+            score_approaches(self.problem, self.lines, scores, memory())
             return scores
 
         found = Parallel(n_jobs=jobs, prefer="threads")(
