@@ -38,7 +38,7 @@ from tcs.kernel.motion.scene import (
     new_motion_workspace,
     with_pairs,
 )
-from tcs.kernel.motion.trees import new_trees
+from tcs.kernel.motion.trees import Trees, new_trees
 from tcs.kernel.problem import build_problem
 from tcs.model.scene import LoweredScene
 from tcs.motion.paths import SHORTCUTS
@@ -124,6 +124,8 @@ class Bench:
         job = load_job("feeding", "wheelchair", robot_of_problems())
         self.robot = job.spec.robot
         self.lowered: LoweredScene = job.lowered(job.scene())
+        self.trees: Trees = new_trees(0)
+        """Memory of the planner, of all queries."""
         self.needed: NDArray[np.bool_] | None = None
         """Which pairs of the robot's own shapes may touch, known from the first problem on."""
 
@@ -140,7 +142,7 @@ class Bench:
             list_needed(scene, new_motion_workspace(scene), needed)
             self.needed = needed[own]
         needed[own] = self.needed
-        return Query(problem, grouped(with_pairs(scene, needed)))
+        return Query(problem, grouped(with_pairs(scene, needed)), self.trees)
 
     def _arrays(self, obstacles: tuple[Obstacle, ...]) -> SceneArrays:
         arrays = self.lowered.arrays
@@ -185,11 +187,10 @@ def _boxes(
 class Query:
     """One problem, prepared."""
 
-    def __init__(self, problem: Problem, scene: MotionScene) -> None:
-        """Take memory for a planner."""
-        self.problem, self.scene = problem, scene
+    def __init__(self, problem: Problem, scene: MotionScene, trees: Trees) -> None:
+        """Take the memory of the planner, and memory for the scene."""
+        self.problem, self.scene, self.trees = problem, scene, trees
         self.work: MotionWorkspace = new_motion_workspace(scene)
-        self.trees = new_trees(0)
 
     def refusal(self, bench: Bench) -> str:
         """Return what excludes start or goal, "" if nothing does."""
