@@ -26,7 +26,7 @@ from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner
 from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.dexterity.measures import rounded_inward
-from tcs.kernel.motion.straight import BLOCKED, DONE
+from tcs.kernel.motion.straight import BLOCKED, DONE, LIMITS
 from tcs.kernel.problem import Problem
 from tcs.kernel.scores import APPROACH_BLOCKED, APPROACH_LIMITS, REACHED
 
@@ -43,6 +43,8 @@ FINE, TIMES = 8, 2
 STEEPEST = 40.0
 """Greatest slope of the slack by the free joint, as in `solve_samples`, on either side of a window
 that may be hidden between columns: four times what scoring allows for."""
+EXPECTED = -2
+"""In place of a contact: postures are checked before their line is followed."""
 SHIFTS = 4
 """Number of times that the columns are moved by a part of their spacing, until a line is free."""
 
@@ -287,6 +289,11 @@ def follow_posture(problem: Problem, approach: Approach, fastest: FloatArray, q:
         centre, level = angle, PIECES
         if _open(problem, approach, b, 0, columns[0] - 1):
             outcome = follow(problem, approach, fastest, b, columns[2], True)
+            if outcome == LIMITS:
+                # Limits may end the shortest path alone, which a contact had led around.
+                approach.contact[0] = EXPECTED
+                _open(problem, approach, b, 0, columns[0] - 1)
+                outcome = follow(problem, approach, fastest, b, columns[2], True)
         else:
             level = grid.deepest[b]
         if outcome == DONE or outcome == BLOCKED or level == NOWHERE:
