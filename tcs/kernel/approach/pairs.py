@@ -293,7 +293,9 @@ def follow_posture(problem: Problem, approach: Approach, fastest: FloatArray, q:
                 # Limits may end the shortest path alone, which a contact had led around.
                 approach.contact[0] = EXPECTED
                 _open(problem, approach, b, 0, columns[0] - 1)
-                outcome = follow(problem, approach, fastest, b, columns[2], True)
+                if follow(problem, approach, fastest, b, columns[2], True) == DONE:
+                    outcome = DONE
+                approach.contact[0] = NO_CONTACT
         else:
             level = grid.deepest[b]
         if outcome == DONE or outcome == BLOCKED or level == NOWHERE:
