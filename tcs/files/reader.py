@@ -184,7 +184,9 @@ class _Reader(pickle._Unpickler):
         self._file.seek(end)
         if not count:
             return np.zeros(shape, dtype=element.dtype.newbyteorder("="))
-        array = np.frombuffer(self._data, dtype=element.dtype, count=count, offset=begin)
+        array: NDArray[Any] = np.frombuffer(
+            self._data, dtype=element.dtype, count=count, offset=begin
+        )
         array = array.reshape(shape, order=order)
         return array.astype(element.dtype.newbyteorder("="), copy=False)
 

@@ -178,7 +178,7 @@ def _stratified(
     counts = np.diff(np.linspace(0, count, STRATA + 1).round().astype(np.int64))
     return np.concatenate(
         [
-            rng.choice(part, min(n, part.size), replace=False)
+            rng.choice(part, min(int(n), part.size), replace=False)
             for part, n in zip(parts, counts, strict=True)
         ]
     )

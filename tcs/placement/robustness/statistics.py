@@ -71,8 +71,8 @@ def intervals_of(
     k, n = values.shape
     mean = values.mean(axis=1)
     more = np.concatenate([values, np.zeros((k, 1)), np.ones((k, 1))], axis=1)
-    half = float(stdtrit(n + 1, (1.0 + CONFIDENCE) / 2.0)) / math.sqrt(n + 2)
-    half = half * more.std(axis=1, ddof=1)
+    factor = float(stdtrit(n + 1, (1.0 + CONFIDENCE) / 2.0)) / math.sqrt(n + 2)
+    half = factor * more.std(axis=1, ddof=1)
     middle = more.mean(axis=1)
     # The two samples move the middle by less than half the width; rounding must not undo that.
     low = np.clip(middle - half, 0.0, mean)

@@ -96,7 +96,9 @@ def spaces_outside(
         reached = distances(parts != parts[0, 0, 0], pitch) <= radius
         beyond = max(borders) - border
         own = tuple(slice(beyond, count - beyond) for count in size)
-        spaces.append(((reached & ~surface)[own].copy(), (first + beyond) * pitch))
+        spaces.append(
+            ((reached & ~surface)[own].copy(), (first + beyond).astype(np.float64) * pitch)
+        )
     return spaces
 
 

@@ -34,7 +34,7 @@ def padding_for(padding: float, scale: ArrayLike) -> FloatArray:
     Returns:
         Shape (...).
     """
-    return np.asarray(padding * np.minimum(1.0, np.min(scale, axis=-1)))
+    return np.asarray(padding * np.minimum(1.0, np.asarray(scale).min(axis=-1)))
 
 
 def parts_of(shape: LinkShape, *, is_uneven: bool) -> int:
