@@ -94,9 +94,12 @@ def main() -> None:
     options = command_line.parse_args()
     header()
     each = seconds = 0.0
+    # Not where temporary files may be kept in memory, which is measured.
+    out = CHECKOUT / "out"
+    out.mkdir(exist_ok=True)
     for grid in options.grids:
-        with tempfile.TemporaryDirectory(dir=".") as made:
-            folder = Path(made).absolute()
+        with tempfile.TemporaryDirectory(dir=out) as made:
+            folder = Path(made)
             name, seconds = measured(folder, grid, options.jobs, each)
             each = each or seconds
             used(folder, name)
