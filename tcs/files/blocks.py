@@ -177,21 +177,29 @@ def load_block(path: Path) -> StoredBlock:
     return FORMAT.load(path, decode)
 
 
-def _read_arrays(content: Mapping[str, Any]) -> None:
+def _read_arrays(content: dict[str, Any]) -> None:
     """Decompress every array of a block, in containers within it too.
 
     Raises:
         StoreFormatError: If one is damaged.
     """
-    for part, value in content.items():
-        if not isinstance(value, dict):
+    waiting = [content]
+    # A container may hold another one many times over, or itself; it is read once.
+    seen: set[int] = set()
+    while waiting:
+        container = waiting.pop()
+        if id(container) in seen:
             continue
-        if "bytes" not in value:
-            _read_arrays(value)
-            continue
-        shape = value.get("shape")
-        lengths = len(shape) if isinstance(shape, list) else 0
-        decompress(dict(content), part, str(value.get("type")), (None,) * lengths)
+        seen.add(id(container))
+        for part, value in container.items():
+            if not isinstance(value, dict):
+                continue
+            if "bytes" not in value:
+                waiting.append(value)
+                continue
+            shape = value.get("shape")
+            lengths = len(shape) if isinstance(shape, list) else 0
+            decompress(container, part, str(value.get("type")), (None,) * lengths)
 
 
 @dataclass(frozen=True, slots=True)

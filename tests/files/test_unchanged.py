@@ -64,6 +64,14 @@ def test_two_changes_within_one_step_of_the_clock_show(tmp_path, read):
         assert read(path, "utf-8") == text
 
 
+def test_a_file_that_has_just_changed_is_read_each_time(tmp_path, read, readings):
+    # Whatever the step of the clock: a later change may bear the same time.
+    path = tmp_path / "a"
+    path.write_text("one")
+    assert [read(path, "utf-8") for _ in range(2)] == ["one"] * 2
+    assert len(readings) == 2
+
+
 def test_a_file_that_is_gone_is_told_by_its_reader(tmp_path, read):
     path = old_file(tmp_path / "a", "one")
     assert read(path, "utf-8") == "one"

@@ -92,7 +92,7 @@ class ByName:
         return call
 
     def _called(self, name, given):
-        raise NotImplementedError
+        raise NotImplementedError  # each transport of the contract has its own
 
     def catalogue(self):
         return self._called("list", {})

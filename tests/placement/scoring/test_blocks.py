@@ -7,9 +7,9 @@ import os
 import numpy as np
 import pytest
 
-from tcs.errors import OutputError
+from tcs.errors import OutputError, StoreFormatError
 from tcs.files import mapped
-from tcs.files.blocks import FORMAT, BlockFolder
+from tcs.files.blocks import FORMAT, BlockFolder, load_block
 from tcs.files.compression import compress
 from tcs.placement.scoring.engines import Work
 from tcs.placement.scoring.shared_blocks import with_goals
@@ -264,3 +264,19 @@ def test_damaged_blocks_of_other_goals_are_not_taken(
         manifest.write_text(text)
         assert_same(run(restart=True)[0], plain)
         assert_same(run()[0], plain)
+
+
+def test_containers_of_a_block_are_read_once_each(tmp_path):
+    array = compress(np.arange(3.0))
+    # As a tree it would have 2^60 leaves; and it holds itself.
+    inside = {"array": array}
+    for _ in range(60):
+        inside = {"first": inside, "second": inside}
+    inside["self"] = inside
+    path = tmp_path / "0000000000.block"
+    FORMAT.save(path, {"key": "k", "block": "b", "inside": inside})
+    assert load_block(path).key == "k"
+    array["bytes"] = array["bytes"][:-1]
+    FORMAT.save(path, {"key": "k", "block": "b", "inside": inside})
+    with pytest.raises(StoreFormatError, match="array"):
+        load_block(path)
