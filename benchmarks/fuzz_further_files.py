@@ -126,7 +126,8 @@ def _write_motions(folder: Path) -> None:
     save_plan(folder / "plan.json", plan(scores, scores.nominal.sets.best, seed=0))
     with tempfile.TemporaryDirectory(dir=folder) as blocks:
         tcs.score(*three(folder), blocks=BlockFolder(Path(blocks)))
-        (block,) = Path(blocks).rglob("*.block")
+        # Another block has the sets.
+        (block,) = Path(blocks).rglob("0*.block")
         shutil.copy(block, folder / "kept.block")
         shutil.copy(block, folder)
         shutil.copy(block.with_name(MANIFEST), folder)
