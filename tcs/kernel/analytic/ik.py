@@ -66,15 +66,14 @@ def sample_joints(
         q: Filled in the real arm's order, shape (7,); a joint without limits is in (-pi, pi].
     """
     R = arm.R
-    v, z, x = goal[0].copy(), goal[1].copy(), goal[2].copy()
     q[0] = q1
-    _inverse_rot_z(q1, v)
-    _inverse_rot_z(q1, z)
-    _inverse_rot_z(q1, x)
-    for i in range(3):
-        v[i] -= arm.p[1, i]
-    square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
-    _inverse_rotate(R[1], v)
+    c, s = np.cos(q1), np.sin(q1)
+    vx, vy, vz = turned_back(c, s, goal[0, 0], goal[0, 1], goal[0, 2])
+    zx, zy, zz = turned_back(c, s, goal[1, 0], goal[1, 1], goal[1, 2])
+    xx, xy, xz = turned_back(c, s, goal[2, 0], goal[2, 1], goal[2, 2])
+    vx, vy, vz = vx - arm.p[1, 0], vy - arm.p[1, 1], vz - arm.p[1, 2]
+    square = vx * vx + vy * vy + vz * vz
+    vx, vy, vz = rotated_back(R[1], vx, vy, vz)
     k = (square - arm.reach[0]) / arm.reach[1]
     k = min(max(k, LEAST_BEND - 1.0), 1.0 - LEAST_BEND)
     q[3] = arm.reach[2] + np.arctan2(branch[0] * np.sqrt(1.0 - k * k), k)
@@ -82,33 +81,35 @@ def sample_joints(
     ux = arm.u0[0] + arm.uc[0] * c4 + arm.us[0] * s4
     uy = arm.u0[1] + arm.uc[1] * c4 + arm.us[1] * s4
     uz = arm.u0[2] + arm.uc[2] * c4 + arm.us[2] * s4
-    q[2] = _angle_to_height(R[2], ux, uy, uz, v[2], branch[1], 0.0)
+    q[2] = _angle_to_height(R[2], ux, uy, uz, vz, branch[1], 0.0)
     c3, s3 = np.cos(q[2]), np.sin(q[2])
     rx, ry = c3 * ux - s3 * uy, s3 * ux + c3 * uy
     kx = R[2, 0, 0] * rx + R[2, 0, 1] * ry + R[2, 0, 2] * uz
     ky = R[2, 1, 0] * rx + R[2, 1, 1] * ry + R[2, 1, 2] * uz
-    q[1] = np.arctan2(kx * v[1] - ky * v[0], kx * v[0] + ky * v[1])
+    q[1] = np.arctan2(kx * vy - ky * vx, kx * vx + ky * vy)
+    c2, s2 = np.cos(q[1]), np.sin(q[1])
     for j in range(1, 4):
-        _inverse_rotate(R[j], z)
-        _inverse_rot_z(q[j], z)
-        _inverse_rotate(R[j], x)
-        _inverse_rot_z(q[j], x)
-    _inverse_rotate(R[4], z)
-    _inverse_rotate(R[4], x)
+        c, s = (c2, s2) if j == 1 else ((c3, s3) if j == 2 else (c4, s4))
+        zx, zy, zz = rotated_back(R[j], zx, zy, zz)
+        zx, zy, zz = turned_back(c, s, zx, zy, zz)
+        xx, xy, xz = rotated_back(R[j], xx, xy, xz)
+        xx, xy, xz = turned_back(c, s, xx, xy, xz)
+    zx, zy, zz = rotated_back(R[4], zx, zy, zz)
+    xx, xy, xz = rotated_back(R[4], xx, xy, xz)
     fx, fy, fz = R[6, 0, 2], R[6, 1, 2], R[6, 2, 2]
-    q[5] = _angle_to_height(R[5], fx, fy, fz, z[2], branch[2], LEAST_FLEX)
+    q[5] = _angle_to_height(R[5], fx, fy, fz, zz, branch[2], LEAST_FLEX)
     c6, s6 = np.cos(q[5]), np.sin(q[5])
     rx, ry = c6 * fx - s6 * fy, s6 * fx + c6 * fy
     kx = R[5, 0, 0] * rx + R[5, 0, 1] * ry + R[5, 0, 2] * fz
     ky = R[5, 1, 0] * rx + R[5, 1, 1] * ry + R[5, 1, 2] * fz
-    tilt = LEAST_TILT if z[0] * z[0] + z[1] * z[1] < TILTED else 0.0
-    zx, zy = z[0] + tilt, z[1] + tilt
+    tilt = LEAST_TILT if zx * zx + zy * zy < TILTED else 0.0
+    zx, zy = zx + tilt, zy + tilt
     q[4] = np.arctan2(kx * zy - ky * zx, kx * zx + ky * zy)
-    _inverse_rot_z(q[4], x)
-    _inverse_rotate(R[5], x)
-    _inverse_rot_z(q[5], x)
-    _inverse_rotate(R[6], x)
-    q[6] = np.arctan2(x[1], x[0])
+    xx, xy, xz = turned_back(np.cos(q[4]), np.sin(q[4]), xx, xy, xz)
+    xx, xy, xz = rotated_back(R[5], xx, xy, xz)
+    xx, xy, xz = turned_back(c6, s6, xx, xy, xz)
+    xx, xy, xz = rotated_back(R[6], xx, xy, xz)
+    q[6] = np.arctan2(xy, xx)
     if arm.free == LAST:
         for j in range(3):
             q[j], q[6 - j] = q[6 - j], q[j]
@@ -149,16 +150,16 @@ def _angle_to_height(
 
 
 @inner
-def _inverse_rot_z(angle: float, v: FloatArray) -> None:
-    """Rotate v by -angle about z, in place."""
-    c, s = np.cos(angle), np.sin(angle)
-    v[0], v[1] = c * v[0] + s * v[1], -s * v[0] + c * v[1]
+def turned_back(c: float, s: float, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Return a vector rotated about z by minus the angle of cosine c and sine s."""
+    return c * x + s * y, -s * x + c * y, z
 
 
 @inner
-def _inverse_rotate(R: FloatArray, v: FloatArray) -> None:
-    """Replace v by R^T v, in place."""
-    x, y, z = v[0], v[1], v[2]
-    v[0] = R[0, 0] * x + R[1, 0] * y + R[2, 0] * z
-    v[1] = R[0, 1] * x + R[1, 1] * y + R[2, 1] * z
-    v[2] = R[0, 2] * x + R[1, 2] * y + R[2, 2] * z
+def rotated_back(R: FloatArray, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Return R^T (x, y, z)."""
+    return (
+        R[0, 0] * x + R[1, 0] * y + R[2, 0] * z,
+        R[0, 1] * x + R[1, 1] * y + R[2, 1] * z,
+        R[0, 2] * x + R[1, 2] * y + R[2, 2] * z,
+    )

@@ -15,7 +15,10 @@ from tcs.kernel.cache import jit
 
 MAX_SAMPLES = 512
 """Most samples that are solved at once."""
-_ROW = np.uint64(MAX_SAMPLES)
+ROW = MAX_SAMPLES + 8
+"""Distance of the rows of joints: at a power of two they would displace each other from the
+processor's cache."""
+_ROW = np.uint64(ROW)
 # Unsigned: numba then adds no test for indices counted from the end, which would keep the compiler
 # from vectorising. Rows at constant distances of one array need no test for overlaps either.
 C2, S2, C3, S3, C4, S4 = (np.uint64(k) * _ROW for k in range(6))
@@ -78,7 +81,7 @@ def solve_samples(
         cosines: cos(q1) for the values of the free joint, shape (>= count,).
         sines: sin(q1) for the same values, shape (>= count,).
         count: Number of samples.
-        rows: Filled from `C2` to `TOOL_Z`, shape (ROWS * MAX_SAMPLES,).
+        rows: Filled from `C2` to `TOOL_Z`, shape (ROWS * ROW,).
         slack: Filled, shape (>= count,): >= 0 where the branch exists and every joint is within its
             limits. It measures the worst condition, as a difference of cosines, and varies
             continuously with q1.

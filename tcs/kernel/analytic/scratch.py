@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tcs.kernel.analytic.arcs import MAX_ARCS
-from tcs.kernel.analytic.samples import MAX_SAMPLES, ROWS, measure_samples, solve_samples
+from tcs.kernel.analytic.samples import MAX_SAMPLES, ROW, ROWS, measure_samples, solve_samples
 from tcs.kernel.analytic.solver import ArmSolver
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant
@@ -41,7 +41,7 @@ class Search(NamedTuple):
     cosine: FloatArray
     sine: FloatArray
     rows: FloatArray
-    """Joints of the samples, see `samples`, shape (ROWS * MAX_SAMPLES,)."""
+    """Joints of the samples, see `samples`, shape (ROWS * ROW,)."""
     slack: FloatArray
     measure: FloatArray
     motion: FloatArray
@@ -107,7 +107,7 @@ def new_search() -> Search:
         np.empty(MAX_SAMPLES),
         np.empty(MAX_SAMPLES),
         np.empty(MAX_SAMPLES),
-        np.empty(ROWS * MAX_SAMPLES),
+        np.empty(ROWS * ROW),
         np.empty(MAX_SAMPLES),
         np.empty(MAX_SAMPLES),
         np.empty(MAX_SAMPLES),

@@ -54,6 +54,8 @@ class ArmSolver(NamedTuple):
     us: FloatArray
     reach: FloatArray
     """|u|^2 = reach[0] + reach[1] cos(q4 - phase) [m^2], with phase = reach[2] [rad]."""
+    phase: FloatArray
+    """Cosine and sine of that phase, shape (2,)."""
     elbow_cos: FloatArray
     """Least and greatest cos(q4 - phase) within the limits of joint 4, shape (2,)."""
     limit_cos: FloatArray
@@ -127,6 +129,7 @@ def arm_solver(chain: Chain) -> ArmSolver:
         uc=uc,
         us=us,
         reach=np.array([u0 @ u0 + uc @ uc, amplitude, phase]),
+        phase=np.array([np.cos(phase), np.sin(phase)]),
         elbow_cos=cos_range(lower[3] - phase, upper[3] - phase, bool(limited[3])),
         limit_cos=np.where(limited, np.cos(half), -1.0),
         middle_cos=np.where(limited, np.cos(middle), 0.0),
@@ -151,6 +154,7 @@ def outside_solver(chain: Chain) -> ArmSolver:
         uc=none.copy(),
         us=none.copy(),
         reach=none.copy(),
+        phase=none.copy(),
         elbow_cos=np.zeros(2),
         limit_cos=np.zeros(7),
         middle_cos=np.zeros(7),

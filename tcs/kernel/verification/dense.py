@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tcs.kernel.analytic.ik import sample_joints, wrist_goal
 from tcs.kernel.analytic.pairs import measure_of, samples_hold_measure
-from tcs.kernel.analytic.samples import AIM, C2, ELBOW_ROUNDING, MAX_SAMPLES, WRIST
+from tcs.kernel.analytic.samples import AIM, C2, ELBOW_ROUNDING, MAX_SAMPLES, ROW, WRIST
 from tcs.kernel.analytic.scratch import Search, fill_samples, measure_feasible, new_search, solve
 from tcs.kernel.analytic.solver import ArmSolver, is_outside
 from tcs.kernel.arrays import FloatArray, IntArray
@@ -229,7 +229,7 @@ def _is_coarse(search: Search, i: int, step: float) -> bool:
     """
     rows, motion = search.rows, 0.0
     for k in range(6):
-        c, s = int(C2) + 2 * k * MAX_SAMPLES, int(C2) + (2 * k + 1) * MAX_SAMPLES
+        c, s = int(C2) + 2 * k * ROW, int(C2) + (2 * k + 1) * ROW
         sine = rows[s + i + 1] * rows[c + i] - rows[c + i + 1] * rows[s + i]
         cosine = rows[c + i + 1] * rows[c + i] + rows[s + i + 1] * rows[s + i]
         motion = max(motion, abs(np.arctan2(sine, cosine)))
