@@ -59,6 +59,12 @@ def is_free_here(scene: MotionScene, work: MotionWorkspace) -> bool:
     for k in range(7):
         work.delta[k] = 0.0
     take_posture(scene, work)
+    return is_placed_free(scene, work)
+
+
+@inner
+def is_placed_free(scene: MotionScene, work: MotionWorkspace) -> bool:
+    """Do as `is_free_here` where the posture is taken, and no joint moves."""
     last = work.contact[0]
     if last >= 0 and is_near(scene, work, last, False):
         return False

@@ -96,6 +96,7 @@ def grouped(scene: MotionScene, carrier: IntArray | None = None) -> MotionScene:
         leaf_shape=leaf,
         root=root,
         leaf_pair=leaf_pair,
+        boxes=np.array([count, len(arm.rows) + shapes]),
         links=arm.rows,
         link_frame=arm.frame,
         fixed=around.rows,
@@ -151,7 +152,8 @@ def boxes_around(links: FloatArray, link_frame: IntArray, body: IntArray) -> Gro
     """
     half = _extents(links)
     low, high = links[:, CENTRE : CENTRE + 3] - half, links[:, CENTRE : CENTRE + 3] + half
-    corners: list[FloatArray] = []
+    # Least coordinates, and the greatest ones with their signs changed, of shapes and boxes.
+    corners = list(np.concatenate([low, -high], axis=1))
     parts: list[tuple[int, ...]] = []
     frames: list[int] = []
 
@@ -161,16 +163,20 @@ def boxes_around(links: FloatArray, link_frame: IntArray, body: IntArray) -> Gro
         if not np.all(of_first):
             return members[of_first], members[~of_first]
         centres = links[members, CENTRE : CENTRE + 3]
-        order = members[np.argsort(centres[:, np.argmax(np.ptp(centres, axis=0))], kind="stable")]
+        order = members[
+            np.argsort(
+                centres[:, np.argmax(centres.max(axis=0) - centres.min(axis=0))], kind="stable"
+            )
+        ]
         return order[: len(order) // 2], order[len(order) // 2 :]
 
     def box(members: IntArray, frame: int) -> int:
         """Return the number of a shape, or of a new box around several."""
         if len(members) == 1:
             return int(members[0])
-        least, most = low[members].min(axis=0), high[members].max(axis=0)
-        parts.append(tuple(box(half, frame) for half in halves(members)))
-        corners.append(np.concatenate([least, most]))
+        pair = tuple(box(half, frame) for half in halves(members))
+        parts.append(pair)
+        corners.append(np.minimum(corners[pair[0]], corners[pair[1]]))
         frames.append(frame)
         return len(links) + len(parts) - 1
 
@@ -179,7 +185,7 @@ def boxes_around(links: FloatArray, link_frame: IntArray, body: IntArray) -> Gro
         members = np.flatnonzero(link_frame == frame)
         alone = frame == NONE or len(members) <= LEAST
         roots += members.tolist() if alone else [box(members, int(frame))]
-    rows = _boxes(np.array(corners).reshape(-1, 6))
+    rows = _boxes(np.array(corners[len(links) :]).reshape(-1, 6) * np.repeat([1.0, -1.0], 3))
     shapes = np.full((len(links), 2), NONE)
     return Groups(
         rows=np.concatenate([links, rows]),

@@ -15,9 +15,9 @@ from tcs.kernel.motion.scene import (
 )
 from tcs.kernel.views import unowned
 
-CELLS = 300
-"""Greatest number of parts of the ranges of the joints that are checked for a pair: one that takes
-more is not left out."""
+CELLS = 1000
+"""Greatest number of parts of the ranges of the joints that are checked for a shape and those of a
+link: pairs that take more are not left out."""
 MOST_BETWEEN = 2
 """Number of joints between two shapes up to which their pair is checked."""
 
@@ -57,22 +57,74 @@ def list_needed(owned_scene: MotionScene, owned_work: MotionWorkspace, needed: B
         needed: Filled, shape (n_pairs,).
     """
     scene, work = unowned(owned_scene), unowned(owned_work)
-    for k in range(len(scene.pair)):
-        link, base = scene.link_frame[scene.pair[k, 0]], scene.pair[k, 2]
-        needed[k] = True
-        if link - base <= MOST_BETWEEN:
-            needed[k] = not _never_touches(scene, work, k, base, link - 1)
+    first = 0
+    while first < len(scene.pair):
+        i, base = scene.pair[first, 0], scene.pair[first, 2]
+        last = first + 1
+        while last < len(scene.pair) and scene.pair[last, 0] == i and scene.pair[last, 2] == base:
+            last += 1
+        is_decided = scene.link_frame[i] - base <= MOST_BETWEEN
+        for k in range(first, last):
+            needed[k] = not is_decided
+        if is_decided:
+            _find_needed(scene, work, first, last, needed)
+        first = last
 
 
 @inner
-def _never_touches(
-    scene: MotionScene, work: MotionWorkspace, k: int, first: int, second: int
-) -> bool:
-    """Return whether a pair is certified over the whole ranges of two joints, or of one.
+def _find_needed(
+    scene: MotionScene, work: MotionWorkspace, begin: int, end: int, needed: BoolArray
+) -> None:
+    """Fill which of some pairs, of one shape with shapes of one link, are not certified.
 
-    Parts of the ranges that are not certified are halved along the joint of the wider one.
+    Parts of the ranges of the two joints between the links, or of one, that are not certified for
+    all pairs are halved along the joint of the wider one, for those that are left.
+
+    Args:
+        scene: The scene.
+        work: Scratch.
+        begin: First pair.
+        end: One after the last pair.
+        needed: False for these pairs; filled.
     """
-    span, top = work.span, 2
+    span, stretch, pairs, top = work.span, work.stretch, work.pairs, 2
+    first, second = scene.pair[begin, 2], scene.link_frame[scene.pair[begin, 0]] - 1
+    _take_ranges(scene, work, first, second)
+    stretch[0, 0], stretch[0, 1] = 0, end - begin
+    for k in range(begin, end):
+        pairs[k - begin] = k
+    cells = 0
+    while top:
+        top -= 2
+        cells += 1
+        for n in range(2):
+            # If both are the same joint, the second part is in force.
+            joint, low, high = second if n == 1 else first, span[top + n, 0], span[top + n, 1]
+            work.q[joint], work.delta[joint] = 0.5 * (low + high), 0.5 * (high - low)
+        take_posture(scene, work)
+        used = to = stretch[top, 1]
+        for m in range(stretch[top, 0], used):
+            k = pairs[m]
+            if needed[k] or not is_near(scene, work, k, True):
+                continue
+            if cells >= CELLS or top + 4 > len(span) or is_near(scene, work, k, False):
+                needed[k] = True
+            else:
+                pairs[to] = k
+                to += 1
+        if to > used:
+            n = 0 if work.delta[first] > work.delta[second] else 1
+            for m in range(2):
+                span[top + 2 + m, 0], span[top + 2 + m, 1] = span[top + m, 0], span[top + m, 1]
+                stretch[top + 2 * m, 0], stretch[top + 2 * m, 1] = used, to
+            middle = 0.5 * (span[top + n, 0] + span[top + n, 1])
+            span[top + n, 1], span[top + 2 + n, 0] = middle, middle
+            top += 4
+
+
+@inner
+def _take_ranges(scene: MotionScene, work: MotionWorkspace, first: int, second: int) -> None:
+    """Fill the first two rows of `span` with the whole ranges of two joints; others rest at 0."""
     for n in range(7):
         work.q[n], work.delta[n] = 0.0, 0.0
     for n in range(2):
@@ -80,23 +132,4 @@ def _never_touches(
         low, high = scene.lower[joint], scene.upper[joint]
         if scene.period[joint] > 0.0:
             low, high = -np.pi, np.pi
-        span[n, 0], span[n, 1] = low, high
-    for _ in range(CELLS):
-        top -= 2
-        for n in range(2):
-            joint, low, high = second if n == 1 else first, span[top + n, 0], span[top + n, 1]
-            work.q[joint], work.delta[joint] = 0.5 * (low + high), 0.5 * (high - low)
-        take_posture(scene, work)
-        if is_near(scene, work, k, True):
-            if top + 4 > len(span) or is_near(scene, work, k, False):
-                return False
-            # If both are the same joint, the second part is in force.
-            n = 0 if work.delta[first] > work.delta[second] else 1
-            for m in range(2):
-                span[top + 2 + m, 0], span[top + 2 + m, 1] = span[top + m, 0], span[top + m, 1]
-            middle = 0.5 * (span[top + n, 0] + span[top + n, 1])
-            span[top + n, 1], span[top + 2 + n, 0] = middle, middle
-            top += 4
-        if top == 0:
-            return True
-    return False
+        work.span[n, 0], work.span[n, 1] = low, high

@@ -12,9 +12,9 @@ from tcs.kernel.arrays import BOX, CAPSULE
 from tcs.kernel.cache import inner
 from tcs.kernel.collide import ROTATION, SIZE, TYPE
 from tcs.kernel.motion.leaf_spheres import compare_spheres
-from tcs.kernel.motion.near_lists import GROUP, any_overlap, append_near, overlaps
+from tcs.kernel.motion.near_lists import any_overlap, append_near, overlaps
 from tcs.kernel.motion.pairs import groups_may_touch, is_near, place_shape
-from tcs.kernel.motion.scene import NO_PAIR, MotionScene, MotionWorkspace
+from tcs.kernel.motion.scene import GROUP, NO_PAIR, MotionScene, MotionWorkspace
 
 
 @inner
@@ -34,7 +34,7 @@ def contact_here(scene: MotionScene, work: MotionWorkspace) -> int:
             end = min(first + GROUP, moving)
             if any_overlap(scene, work, i, first, end, 0.0):
                 for k in range(first, end):
-                    if overlaps(scene, work, i, k, 0.0):
+                    if overlaps(scene, work, i, k, first, 0.0):
                         found = _contact_below(scene, work, k)
                         if found != NO_PAIR:
                             return found

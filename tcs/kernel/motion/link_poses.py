@@ -60,6 +60,20 @@ def place_links(
         first, second = (c, s) if is_odd else (s, c)
         sine[k] = -first if side >= 2.0 else first
         cosine[k] = -second if side == 1.0 or side == 2.0 else second
+    place_turned(chain_R, chain_p, q, turns, link_R, link_p)
+
+
+@inner
+def place_turned(
+    chain_R: FloatArray,
+    chain_p: FloatArray,
+    q: FloatArray,
+    turns: FloatArray,
+    link_R: FloatArray,
+    link_p: FloatArray,
+) -> None:
+    """Do as `place_links`, given the sines and cosines of the joints in `turns`."""
+    sine, cosine = turns[1], turns[2]
     for r in range(3):
         link_p[0, r] = 0.0
         for c in range(3):

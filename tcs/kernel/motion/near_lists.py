@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from tcs.kernel.arrays import BOX
 from tcs.kernel.cache import inner
-from tcs.kernel.collide import CENTRE, SIZE, TYPE
+from tcs.kernel.collide import BOUND, CENTRE, ROTATION, SIZE, TYPE
+from tcs.kernel.motion.group_boxes import boxes_apart, take_frames
 from tcs.kernel.motion.leaf_spheres import compare_spheres
 from tcs.kernel.motion.pairs import is_of_groups, may_touch_on_piece, place_shape
-from tcs.kernel.motion.scene import NO_PAIR, MotionScene, MotionWorkspace
+from tcs.kernel.motion.scene import GROUP, NO_PAIR, MotionScene, MotionWorkspace
 
 FAR = 0.25
 """Motion relative to the size of a pair of groups above which the piece is halved first."""
-GROUP = 16
-"""Number of pairs that one vector loop checks."""
 
 
 @inner
@@ -38,7 +37,7 @@ def list_near(scene: MotionScene, work: MotionWorkspace, extra: float, most: int
             apart = work.motion[i, 0] + extra
             if any_overlap(scene, work, i, first, end, apart):
                 for k in range(first, end):
-                    if count < most and overlaps(scene, work, i, k, apart):
+                    if count < most and overlaps(scene, work, i, k, first, apart):
                         if has_leaves(scene, k):
                             count = _append_leaves(scene, work, k, extra, count, most)
                         else:
@@ -102,36 +101,55 @@ def any_overlap(
 
     Args:
         scene: The scene.
-        work: Scratch, with the current posture.
+        work: Scratch, with the current posture; `apart` is filled, below 0 for each pair whose
+            spheres are closer.
         i: Shape of the arm.
         first: First pair.
-        last: One after the last pair.
+        last: One after the last pair, GROUP later at most.
         extra: Added to the gap of each pair [m].
     """
     gap, bound = scene.gap[first:last], scene.bound[first:last]
     u, v, w = scene.centre[0, first:last], scene.centre[1, first:last], scene.centre[2, first:last]
-    shapes = work.shapes
+    shapes, excess = work.shapes, work.apart
     x, y, z = shapes[i, CENTRE], shapes[i, CENTRE + 1], shapes[i, CENTRE + 2]
     overlaps = 0
     # No branch and no early end: LLVM makes this loop a vector loop.
     for n in range(len(gap)):
         dx, dy, dz = u[n] - x, v[n] - y, w[n] - z
         apart = bound[n] + gap[n] + extra
-        overlaps += int(dx * dx + dy * dy + dz * dz < apart * apart)
+        excess[n] = dx * dx + dy * dy + dz * dz - apart * apart
+        overlaps += int(excess[n] < 0.0)
     return overlaps > 0
 
 
 @inner
-def overlaps(scene: MotionScene, work: MotionWorkspace, i: int, k: int, extra: float) -> bool:
-    """Return whether pair k, of shape i and a fixed one, is as `any_overlap` says of some."""
+def overlaps(
+    scene: MotionScene, work: MotionWorkspace, i: int, k: int, first: int, extra: float
+) -> bool:
+    """Return whether pair k is as `any_overlap`, for pairs from `first` on, says of some.
+
+    The bounding sphere of the fixed shape is compared with shape i itself too: links are long.
+    """
+    if work.apart[k - first] >= 0.0:
+        return False
     shapes, centre = work.shapes, scene.centre
+    if shapes[i, TYPE] != BOX:
+        return True
     dx, dy, dz = (
         centre[0, k] - shapes[i, CENTRE],
         centre[1, k] - shapes[i, CENTRE + 1],
         centre[2, k] - shapes[i, CENTRE + 2],
     )
-    apart = scene.bound[k] + scene.gap[k] + extra
-    return dx * dx + dy * dy + dz * dz < apart * apart
+    square, apart = 0.0, scene.bound[k] - shapes[i, BOUND] + scene.gap[k] + extra
+    for m in range(3):
+        along = (
+            shapes[i, ROTATION + m] * dx
+            + shapes[i, ROTATION + 3 + m] * dy
+            + shapes[i, ROTATION + 6 + m] * dz
+        )
+        beyond = max(abs(along) - shapes[i, SIZE + m], 0.0)
+        square += beyond * beyond
+    return square < apart * apart
 
 
 @inner
@@ -193,7 +211,10 @@ def append_below(
         Number of pairs listed.
     """
     pairs, stack, below = work.pairs, work.stack, scene.below
-    top = 0
+    whole, top = moved, 0
+    still = _are_boxes(scene, k)
+    if still:
+        take_frames(scene, work, scene.pair[k, 0], scene.pair[k, 1])
     while count < most:
         if is_of_groups(scene, k) and moved <= FAR * scene.bound[k]:
             for n in range(below[k, 0], below[k, 1]):
@@ -207,6 +228,12 @@ def append_below(
             top -= 1
             k = stack[top]
             i, j, base = scene.pair[k, 0], scene.pair[k, 1], scene.pair[k, 2]
+            if still and _are_boxes(scene, k):
+                if boxes_apart(scene, work, i, j, scene.gap[k] + extra + whole):
+                    continue
+                if whole <= FAR * scene.bound[k]:
+                    moved, near = whole, True
+                    continue
             place_shape(scene, work, i)
             if base > 0:
                 place_shape(scene, work, j)
@@ -215,3 +242,9 @@ def append_below(
         if not near:
             break
     return count
+
+
+@inner
+def _are_boxes(scene: MotionScene, k: int) -> bool:
+    """Return whether pair k is of a box around shapes of a link and one around fixed shapes."""
+    return bool(scene.pair[k, 0] >= scene.boxes[0] and scene.pair[k, 1] >= scene.boxes[1])

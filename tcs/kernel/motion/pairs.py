@@ -20,7 +20,7 @@ from tcs.kernel.arrays import BOX, CAPSULE, FloatArray
 from tcs.kernel.cache import inner
 from tcs.kernel.collide import BOUND, CENTRE, ROTATION, SIZE, TYPE, closer, move, spheres_overlap
 from tcs.kernel.distances import distance_bound
-from tcs.kernel.motion.link_poses import place_links
+from tcs.kernel.motion.link_poses import place_links, place_turned
 from tcs.kernel.motion.planes import TWISTED, plane_between
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
 from tcs.kernel.motion.tool_line import SEEN_FROM_TOOL, follows_line, line_motion, off_line
@@ -211,6 +211,14 @@ def take_posture(scene: MotionScene, work: MotionWorkspace) -> None:
         if work.delta[k] > 0.0:
             work.posture[1] = 1
     place_links(scene.chain_R, scene.chain_p, work.q, work.turns, work.link_R, work.link_p)
+
+
+@inner
+def take_turned_posture(scene: MotionScene, work: MotionWorkspace) -> None:
+    """Do as `take_posture` where no joint moves, given the joints' sines and cosines in `turns`."""
+    work.posture[0] += 1
+    work.posture[1] = 0
+    place_turned(scene.chain_R, scene.chain_p, work.q, work.turns, work.link_R, work.link_p)
 
 
 @inner

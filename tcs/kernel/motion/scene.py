@@ -18,6 +18,8 @@ STACK = 256
 MOST_PIECES = 16
 """Greatest number of pieces of a curve, a power of two."""
 NO_PAIR = -1
+GROUP = 16
+"""Number of pairs that one vector loop checks."""
 DEPTH = 40
 """Greatest number of halvings of a curve: 2^-40 of any motion is below RESOLUTION of `edges`."""
 WIDE = 256
@@ -90,6 +92,9 @@ class MotionScene(NamedTuple):
     leaf_pair: IntArray
     """Pair of each column of `leaf` with each fixed shape, NO_PAIR if it is not checked, shape
     (n_leaf, number of fixed shapes without boxes around others)."""
+    boxes: IntArray
+    """Number of the arm's first box around others among its shapes, and of the first one around
+    fixed shapes among all shapes, shape (2,)."""
     root: IntArray
     """Box around shapes of a link in which each shape of the arm is, itself if it is in none, shape
     (n_arm,)."""
@@ -157,6 +162,12 @@ class MotionWorkspace(NamedTuple):
     other: FloatArray
     """The fixed shape that `leaves` compares with, in the frame of a link: its three axes, the
     link's origin from its centre along them, and the half sizes of its core [m], shape (5, 3)."""
+    apart: FloatArray
+    """Squared distance of the bounding spheres of pairs, less the square of what they must keep
+    [m^2], shape (GROUP,)."""
+    between: FloatArray
+    """Axes of a link's frame and its origin along the axes of boxes around fixed shapes, and these
+    axes in A, see `group_boxes`, shape (3, 7)."""
     contact: IntArray
     """The pair found in contact last, -1 for none, shape (1,)."""
     hits: IntArray
@@ -228,6 +239,7 @@ def torso_scene(problem: Problem, torso: int) -> MotionScene:
         distances=problem.distances,
         leaf=np.zeros((4, 0)),
         leaves=np.zeros((count, 2), np.int64),
+        boxes=np.array([count, count + len(fixed)]),
         root=np.arange(count),
         leaf_shape=np.zeros(0, np.int64),
         leaf_pair=np.zeros((0, len(fixed)), np.int64),
@@ -346,6 +358,8 @@ def new_motion_workspace(scene: MotionScene) -> MotionWorkspace:
         stretch=np.empty((WIDE + 2 * DEPTH, 2), np.int64),
         excess=np.empty(scene.leaf.shape[1]),
         other=np.empty((5, 3)),
+        apart=np.empty(GROUP),
+        between=np.empty((3, 7)),
         contact=np.full(1, NO_PAIR, np.int64),
         hits=np.zeros(pairs, np.int64),
     )

@@ -180,15 +180,17 @@ def test_shapes_of_the_base_are_in_boxes_at_every_torso_level(many, chain, rng):
     )
     problem = build_problem(scene, toy_grid())
     lines = approach_scene(problem)
-    first = len(lines.motion.links) + len(lines.motion.fixed) - lines.boxes.shape[1]
-    assert lines.boxes.shape[1] > 0
+    arm = len(lines.motion.links)
+    shift = arm + problem.environment_body.size
+    first = shift + len(problem.body_body)
+    assert first < arm + len(lines.motion.fixed)
     assert problem.torso_levels > 1
-    shift = len(lines.motion.links) + problem.environment_body.size
-    for n in range(lines.boxes.shape[1]):
-        members = [i - shift for i in shapes_in(lines.motion, first + n)]
+    for n in range(first, arm + len(lines.motion.fixed)):
+        members = [i - shift for i in shapes_in(lines.motion, n)]
         assert members
         for torso in range(problem.torso_levels):
-            box = lines.boxes[torso, n]
+            still = lines.motion.fixed[n - arm]
+            box = np.concatenate([lines.moved[torso, lines.moving == n], still[None]])[0]
             for row in problem.body_A[torso, members]:
                 beyond = (extremes(row) - box[CENTRE : CENTRE + 3]) @ box[ROTATION:].reshape(3, 3)
                 assert np.all(np.abs(beyond) <= box[SIZE : SIZE + 3])
