@@ -8,6 +8,7 @@ from tcs.kernel.approach.curve import path_touches
 from tcs.kernel.approach.follow import close_goal, contact_at, follow
 from tcs.kernel.approach.grid import NOWHERE, take_path
 from tcs.kernel.approach.memory import MOST_CURVES, Approach
+from tcs.kernel.approach.opening import lead_on
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, int_constant
 from tcs.kernel.kinematics import copy_joints
@@ -75,27 +76,58 @@ def _list_candidates(problem: Problem, approach: Approach) -> int:
     been free, it would have found them.
     """
     grid, search, columns = approach.grid, approach.search, approach.columns
-    count, best = 0, NOWHERE
+    _measure_nodes(problem, approach)
+    best, best_branch = NOWHERE, NOWHERE
+    while True:
+        best_branch, best = _best_node(problem, approach)
+        if best == NOWHERE or lead_on(problem, approach, best_branch, best):
+            break
+    count = 0
     for b in range(len(problem.arm.branches)):
         for i in range(columns[0]):
             if grid.onward[b, 0, i] == NOWHERE or count == len(search.key):
                 continue
-            measure = measure_at_goal(problem, approach, b, i)
-            grid.measure[b, i] = measure
             search.found_branch[count], search.found_pair[count, 0] = b, i
-            search.key[count] = -measure
-            if measure > approach.known[0]:
+            search.key[count] = -grid.measure[b, i]
+            if grid.measure[b, i] > approach.known[0]:
                 search.key[count] += 2.0 * PHASE
-            elif best == NOWHERE or search.key[count] < search.key[best]:
-                best = count
+            if b == best_branch and i == best:
+                search.key[count] -= PHASE
+            elif i % STRIDE:
+                search.key[count] += PHASE
             count += 1
-    for n in range(count):
-        if n == best:
-            search.key[n] -= PHASE
-        elif search.found_pair[n, 0] % STRIDE:
-            search.key[n] += PHASE
     sort_candidates(search, count)
     return count
+
+
+@inner
+def _measure_nodes(problem: Problem, approach: Approach) -> None:
+    """Fill the measure of all open nodes at the goal."""
+    if samples_hold_measure(problem):
+        return
+    grid = approach.grid
+    for b in range(len(problem.arm.branches)):
+        for i in range(approach.columns[0]):
+            if grid.onward[b, 0, i] != NOWHERE:
+                grid.measure[b, i] = measure_at_goal(problem, approach, b, i)
+
+
+@inner
+def _best_node(problem: Problem, approach: Approach) -> tuple[int, int]:
+    """Return branch and column of the best open node at the goal, NOWHERE without one.
+
+    It is no better than the posture that scoring found.
+    """
+    grid, known = approach.grid, approach.known[0]
+    branch = column = NOWHERE
+    for b in range(len(problem.arm.branches)):
+        measure, onward = grid.measure[b], grid.onward[b, 0]
+        for i in range(approach.columns[0]):
+            if onward[i] == NOWHERE or measure[i] > known:
+                continue
+            if column == NOWHERE or measure[i] > grid.measure[branch, column]:
+                branch, column = b, i
+    return branch, column
 
 
 @inner
@@ -131,7 +163,7 @@ def _better(problem: Problem, approach: Approach, b: int, i: int) -> int:
 def _seems_free(problem: Problem, approach: Approach, b: int, column: int) -> bool:
     """Return whether a node at the goal is free of contact, and its line where others are not."""
     grid, columns = approach.grid, approach.columns
-    if grid.onward[b, 0, column] == NOWHERE:
+    if not lead_on(problem, approach, b, column):
         return False
     take_path(grid, b, column)
     if columns[5] == 1 and path_touches(

@@ -6,14 +6,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tcs.kernel.analytic.ik import sample_joints, wrist_goal
+from tcs.kernel.analytic.ik import wrist_goal
 from tcs.kernel.analytic.solver import ArmSolver
 from tcs.kernel.approach.grid import PIECES, LineGrid
+from tcs.kernel.approach.turns import place_sample
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant
 from tcs.kernel.contacts import Workspace
 from tcs.kernel.motion.edges import curve_is_free
-from tcs.kernel.motion.pairs import is_near, take_posture
+from tcs.kernel.motion.pairs import is_near, take_turned_posture
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
 from tcs.kernel.motion.straight import (
     OFF_LINE,
@@ -214,10 +215,8 @@ def path_touches(
             grid.p_AT[r] = curve.line.p_AT[r] + fraction * offset[r]
         wrist_goal(arm, curve.line.R_AT, grid.p_AT, curve.goal)
         angle, _ = _path_at(grid, fraction)
-        sample_joints(arm, curve.goal, arm.branches[b], angle, motion.q)
-        for joint in range(7):
-            motion.delta[joint] = 0.0
-        take_posture(scene, motion)
+        place_sample(arm, curve.goal, arm.branches[b], angle, motion.q, motion.turns)
+        take_turned_posture(scene, motion)
         if is_near(scene, motion, k, False):
             curve.blocked[0], curve.blocked[1] = _level_after(fraction), k
             return True
@@ -277,7 +276,7 @@ def _fill_points(
             line.target[r] = p_AT[r] = line.p_AT[r] + fraction * offset[r]
         wrist_goal(arm, line.R_AT, p_AT, curve.goal)
         angle, rate = _path_at(grid, fraction)
-        sample_joints(arm, curve.goal, arm.branches[b], angle, q)
+        place_sample(arm, curve.goal, arm.branches[b], angle, q, line.turns)
         if n > 0:
             for k in range(7):
                 if scene.period[k] > 0.0:

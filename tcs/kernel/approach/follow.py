@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from tcs.kernel.analytic.ik import sample_joints
 from tcs.kernel.approach.curve import fill_spline, path_touches, spline_is_free
 from tcs.kernel.approach.grid import NOWHERE, PIECES, close_node, column_at, take_path
 from tcs.kernel.approach.memory import ENOUGH, MOST_CURVES, Approach
+from tcs.kernel.approach.opening import lead_on, make_whole
 from tcs.kernel.approach.scene import pair_contact_code
+from tcs.kernel.approach.turns import place_sample
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner
 from tcs.kernel.contacts import NO_CONTACT
-from tcs.kernel.motion.edges import is_free_here
-from tcs.kernel.motion.pairs import is_near, take_posture
+from tcs.kernel.motion.edges import is_placed_free
+from tcs.kernel.motion.pairs import is_near, take_turned_posture
 from tcs.kernel.motion.scene import NO_PAIR, MotionScene
 from tcs.kernel.motion.straight import BLOCKED, DONE, LIMITS
 from tcs.kernel.problem import Problem
@@ -53,6 +54,7 @@ def follow(
     if is_free:
         grid.is_free[b, 0, column] = True
     outcome = CLOSED
+    lead_on(problem, approach, b, column)
     while grid.onward[b, 0, column] != NOWHERE and columns[4] <= MOST_CURVES:
         take_path(grid, b, column)
         if columns[5] == 1 and path_touches(
@@ -62,9 +64,7 @@ def follow(
             if not is_free:
                 # Closing the node would close it to postures too whose lines lead past the contact.
                 break
-            level = curve.blocked[0]
-            i = column_at(grid, b, column, level)
-            close_node(grid, b, level, i, columns[0], columns[1])
+            _close(problem, approach, b, column, curve.blocked[0])
             continue
         level, k = _first_contact(problem, approach, b, column)
         is_at_level = level != NOWHERE
@@ -87,8 +87,7 @@ def follow(
             if _is_of_gripper(scene, k):
                 columns[4] = ENOUGH
                 break
-        i = column_at(grid, b, column, level)
-        close_node(grid, b, level, i, columns[0], columns[1])
+        i = _close(problem, approach, b, column, level)
         if is_at_level:
             _close_beside(problem, approach, b, level, i, k)
     if outcome != DONE:
@@ -118,6 +117,18 @@ def _is_of_gripper(scene: MotionScene, k: int) -> bool:
 
 
 @inner
+def _close(problem: Problem, approach: Approach, b: int, column: int, level: int) -> int:
+    """Close the node at a level of the path from a column at the goal; return its column."""
+    grid, columns = approach.grid, approach.columns
+    if level > 0:
+        # Other lines lead past it in columns that have not been looked at.
+        make_whole(problem, approach, b)
+    i = column_at(grid, b, column, level)
+    close_node(grid, b, level, i, columns[0], columns[1])
+    return i
+
+
+@inner
 def _close_beside(
     problem: Problem, approach: Approach, b: int, level: int, column: int, k: int
 ) -> None:
@@ -134,7 +145,6 @@ def _close_beside(
             ):
                 break
             _take_node(problem, approach, b, i, level)
-            take_posture(approach.scene, motion)
             if not is_near(approach.scene, motion, k, False):
                 break
             close_node(grid, b, level, i, columns[0], columns[1])
@@ -142,12 +152,11 @@ def _close_beside(
 
 @inner
 def _take_node(problem: Problem, approach: Approach, b: int, i: int, level: int) -> None:
-    """Fill `motion.q` with the posture of a node of the grid; no joint moves."""
+    """Take the posture of a node of the grid; no joint moves."""
     arm, grid, motion = problem.arm, approach.grid, approach.motion
     angle = grid.origin[0] + i * grid.origin[1]
-    sample_joints(arm, grid.goal[level], arm.branches[b], angle, motion.q)
-    for k in range(7):
-        motion.delta[k] = 0.0
+    place_sample(arm, grid.goal[level], arm.branches[b], angle, motion.q, motion.turns)
+    take_turned_posture(approach.scene, motion)
 
 
 @inner
@@ -182,6 +191,6 @@ def _first_contact(problem: Problem, approach: Approach, b: int, column: int) ->
 def contact_at(problem: Problem, approach: Approach, b: int, i: int, level: int) -> int:
     """Return a pair in contact at a node of the grid, or NO_PAIR."""
     _take_node(problem, approach, b, i, level)
-    if is_free_here(approach.scene, approach.motion):
+    if is_placed_free(approach.scene, approach.motion):
         return NO_PAIR
     return approach.motion.contact[0]

@@ -13,7 +13,6 @@ import numpy as np
 
 from tcs.kernel.analytic.ik import wrist_goal
 from tcs.kernel.analytic.samples import MAX_SAMPLES
-from tcs.kernel.analytic.scratch import Search, best_of, fill_samples, measure_feasible, solve
 from tcs.kernel.analytic.solver import ArmSolver
 from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant
@@ -27,6 +26,8 @@ OVERLAP = 0.3
 """Distance by which the angles of a free joint without limits go beyond a full turn [rad]."""
 BRANCHES = 8
 NOWHERE = -1
+UNSEEN = -2
+"""In place of a column: where the line leads has not been looked at."""
 TWO = int_constant(2)
 
 
@@ -42,8 +43,11 @@ class LineGrid(NamedTuple):
     is_free: BoolArray
     """Whether each node is known to be free of contact, shape as `is_open`."""
     onward: IntArray
-    """Column of the nearest node of the next level from which the line can be completed, or
-    NOWHERE, shape (BRANCHES, PIECES + 1, MAX_SAMPLES)."""
+    """Column of the nearest node of the next level from which the line can be completed, NOWHERE,
+    or at the goal UNSEEN, shape (BRANCHES, PIECES + 1, MAX_SAMPLES)."""
+    is_whole: BoolArray
+    """Whether all levels of each branch are filled; else that of the goal is, and the columns of
+    lines along which the free joint rests, shape (BRANCHES,)."""
     nearest: IntArray
     """Scratch, shape (MAX_SAMPLES,)."""
     spans: IntArray
@@ -72,6 +76,7 @@ def new_grid() -> LineGrid:
         np.zeros((BRANCHES, PIECES + 1, MAX_SAMPLES), np.bool_),
         np.zeros((BRANCHES, PIECES + 1, MAX_SAMPLES), np.bool_),
         np.zeros((BRANCHES, PIECES + 1, MAX_SAMPLES), np.int64),
+        np.zeros(BRANCHES, np.bool_),
         np.zeros(MAX_SAMPLES, np.int64),
         np.zeros((BRANCHES, PIECES + 1, 2), np.int64),
         np.zeros(BRANCHES, np.int64),
@@ -138,64 +143,6 @@ def place_fine_columns(arm: ArmSolver, grid: LineGrid, through: float, step: flo
 def is_limited(arm: ArmSolver) -> bool:
     """Return whether the free joint has limits."""
     return bool(arm.upper[arm.free] - arm.lower[arm.free] < np.inf)
-
-
-@inner
-def open_levels(
-    arm: ArmSolver,
-    search: Search,
-    grid: LineGrid,
-    b: int,
-    columns: int,
-    most: int,
-    first: int,
-    last: int,
-) -> bool:
-    """Find the open nodes of one branch that can be reached from the goal.
-
-    Args:
-        arm: The arm.
-        search: Scratch.
-        grid: `is_open`, `spans`, `deepest` and `slack` are filled, and `measure` at the goal.
-        b: The branch.
-        columns: Number of columns.
-        most: Greatest number of columns that the free joint moves from level to level.
-        first: First column at the goal.
-        last: Last column at the goal.
-
-    Returns:
-        Whether any node of the last level can be reached.
-    """
-    narrow = last - first + 1 < columns
-    grid.deepest[b] = NOWHERE
-    for level in range(PIECES + 1):
-        is_open, is_free = grid.is_open[b, level], grid.is_free[b, level]
-        for i in range(columns):
-            is_open[i] = is_free[i] = False
-        count = last - first + 1
-        start = grid.origin[0] + first * grid.origin[1]
-        fill_samples(search, start, start + max(count - 1, 1) * grid.origin[1], max(count, TWO))
-        for r in range(4):
-            for c in range(3):
-                search.goal[r, c] = grid.goal[level, r, c]
-        solve(arm, search, b, count)
-        if level == 0:
-            measure_feasible(arm, search, count)
-        low, high = columns, NOWHERE
-        for i in range(count):
-            if search.slack[i] >= 0.0:
-                is_open[first + i] = True
-                low, high = min(low, first + i), first + i
-                if level == 0:
-                    grid.measure[b, first + i] = search.measure[i]
-        if high == NOWHERE:
-            grid.slack[b] = search.slack[best_of(search.slack, count)]
-            return False
-        grid.deepest[b] = level
-        grid.spans[b, level, 0], grid.spans[b, level, 1] = low, high
-        if not narrow:
-            first, last = max(low - most, 0), min(high + most, columns - 1)
-    return True
 
 
 @inner

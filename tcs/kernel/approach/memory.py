@@ -28,9 +28,9 @@ class Approach(NamedTuple):
     search: Search
     grid: LineGrid
     scene: MotionScene
-    boxes: FloatArray
-    """As in `LineScene`."""
     moving: IntArray
+    """As in `LineScene`."""
+    moved: FloatArray
     """As in `LineScene`."""
     motion: MotionWorkspace
     curve: CurveWorkspace
@@ -55,8 +55,8 @@ def new_approach(problem: Problem, lines: LineScene) -> Approach:
         new_search(),
         new_grid(),
         scene,
-        lines.boxes,
         lines.moving,
+        lines.moved,
         new_motion_workspace(scene),
         new_curve(),
         np.empty(3),

@@ -15,13 +15,12 @@ from tcs.kernel.approach.grid import (
     PIECES,
     TWO,
     LineGrid,
-    find_onward,
-    open_levels,
     place_columns,
     place_fine_columns,
     place_levels,
 )
 from tcs.kernel.approach.memory import ENOUGH, Approach
+from tcs.kernel.approach.opening import make_whole, open_branch, open_goal
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner
 from tcs.kernel.contacts import NO_CONTACT
@@ -105,7 +104,7 @@ def _is_approachable(problem: Problem, approach: Approach, fastest: FloatArray) 
     for n in range(2):
         near = n * NEAR
         first, last = max(column - near, 0), min(column + near, columns[0] - 1)
-        is_complete = _open(problem, approach, b, first, last)
+        is_complete = open_branch(problem, approach, b, first, last)
         if n == 0 and grid.is_open[b, 0, column]:
             approach.known[0] = measure_at_goal(problem, approach, b, column)
         if is_complete and follow(problem, approach, fastest, b, column, True) == DONE:
@@ -119,7 +118,7 @@ def _is_approachable(problem: Problem, approach: Approach, fastest: FloatArray) 
 def _search(problem: Problem, approach: Approach, fastest: FloatArray) -> bool:
     """Fill `search.best` with the best approachable node; return whether there is one."""
     for b in range(len(problem.arm.branches)):
-        _open(problem, approach, b, 0, approach.columns[0] - 1)
+        open_goal(problem, approach, b, 0, approach.columns[0] - 1)
     return follow_candidates(problem, approach, fastest)
 
 
@@ -136,6 +135,7 @@ def _search_narrow(problem: Problem, approach: Approach, fastest: FloatArray) ->
     arm, grid, columns = problem.arm, approach.grid, approach.columns
     first, step, column = grid.origin[0], grid.origin[1], columns[2]
     for b in range(len(arm.branches)):
+        make_whole(problem, approach, b)
         level = grid.deepest[b]
         if level == NOWHERE or (level == PIECES and b != columns[3]):
             continue
@@ -192,7 +192,7 @@ def _follow_narrow(
             for other in range(len(arm.branches)):
                 for i in range(columns[0]):
                     grid.onward[other, 0, i] = NOWHERE
-            if _open(problem, approach, b, 0, columns[0] - 1):
+            if open_branch(problem, approach, b, 0, columns[0] - 1):
                 return follow_candidates(problem, approach, fastest)
             level = grid.deepest[b]
             if level == NOWHERE:
@@ -287,12 +287,12 @@ def follow_posture(problem: Problem, approach: Approach, fastest: FloatArray, q:
             if not 0 <= columns[2] < columns[0]:
                 break
         centre, level = angle, PIECES
-        if _open(problem, approach, b, 0, columns[0] - 1):
+        if open_branch(problem, approach, b, 0, columns[0] - 1):
             outcome = follow(problem, approach, fastest, b, columns[2], True)
             if outcome == LIMITS:
                 # Limits may end the shortest path alone, which a contact had led around.
                 approach.contact[0] = EXPECTED
-                _open(problem, approach, b, 0, columns[0] - 1)
+                open_branch(problem, approach, b, 0, columns[0] - 1)
                 if follow(problem, approach, fastest, b, columns[2], True) == DONE:
                     outcome = DONE
                 approach.contact[0] = NO_CONTACT
@@ -304,18 +304,6 @@ def follow_posture(problem: Problem, approach: Approach, fastest: FloatArray, q:
             middle = 0.5 * (grid.spans[b, level, 0] + grid.spans[b, level, 1])
             centre = grid.origin[0] + middle * grid.origin[1]
     return outcome
-
-
-@inner
-def _open(problem: Problem, approach: Approach, b: int, first: int, last: int) -> bool:
-    """Fill the nodes of a branch from columns at the goal; return whether the line is complete."""
-    grid, columns = approach.grid, approach.columns
-    if open_levels(problem.arm, approach.search, grid, b, columns[0], columns[1], first, last):
-        find_onward(grid, b, columns[0], columns[1])
-        return True
-    for i in range(columns[0]):
-        grid.onward[b, 0, i] = NOWHERE
-    return False
 
 
 @inner

@@ -40,12 +40,11 @@ class LineScene(NamedTuple):
     motion: MotionScene
     """Shapes of the arm and pairs; the places of fixed shapes are those of the first torso level,
     in no particular environment."""
-    boxes: FloatArray
-    """Boxes around groups of the robot's fixed shapes in A at each torso level, packed, shape
-    (torso levels, n_boxes, 17)."""
     moving: IntArray
-    """Fixed shapes of the robot that are elsewhere in A at other torso levels: indices among
-    them."""
+    """Fixed shapes of the robot, and boxes around groups of them, that are elsewhere in A at other
+    torso levels: indices among all shapes, shape (n_moving,)."""
+    moved: FloatArray
+    """These in A at each torso level, packed, shape (torso levels, n_moving, 17)."""
 
 
 def approach_scene(problem: Problem) -> LineScene:
@@ -64,8 +63,12 @@ def approach_scene(problem: Problem) -> LineScene:
             scene = with_pairs(first._replace(fixed=fixed), left)
             needed[left] = needed_pairs(scene, problem.environment_bodies)
     scene = grouped(with_pairs(first, needed), carriers(problem))
-    moving = np.flatnonzero(_is_moved(problem)[: len(problem.body_body)])
-    return LineScene(scene, _boxes(problem, scene), moving)
+    of_robot = np.concatenate(
+        [problem.body_A[:, : len(problem.body_body)], _boxes(problem, scene)], axis=1
+    )
+    moving = np.flatnonzero(_is_moved(of_robot))
+    first_shape = len(scene.links) + problem.environment_body.size
+    return LineScene(scene, first_shape + moving, np.ascontiguousarray(of_robot[:, moving]))
 
 
 def _is_apart_from_torso(problem: Problem, scene: MotionScene) -> BoolArray:
@@ -75,20 +78,20 @@ def _is_apart_from_torso(problem: Problem, scene: MotionScene) -> BoolArray:
         problem: The scene and its grid.
         scene: A scene of it without groups; the result has shape (n_pairs,).
     """
-    moved = _is_moved(problem)
+    moved = _is_moved(problem.body_A)
     shape = scene.pair[:, 1] - len(scene.links) - problem.environment_body.size
     found: BoolArray = (shape >= 0) & moved[np.maximum(shape, 0)]
     return found
 
 
-def _is_moved(problem: Problem) -> BoolArray:
-    """Return which shapes of the robot are elsewhere in A at other torso levels."""
-    moved: BoolArray = np.any(np.abs(problem.body_A - problem.body_A[0]) > ROUNDING, axis=(0, 2))
+def _is_moved(rows: FloatArray) -> BoolArray:
+    """Return which packed shapes, shape (torso levels, n, 17), are elsewhere at other levels."""
+    moved: BoolArray = np.any(np.abs(rows - rows[0]) > ROUNDING, axis=(0, 2))
     return moved
 
 
 def _boxes(problem: Problem, scene: MotionScene) -> FloatArray:
-    """Return the boxes around groups of fixed shapes at each torso level, see `LineScene`."""
+    """Return the boxes around groups of fixed shapes in A, shape (torso levels, n_boxes, 17)."""
     shapes = problem.environment_body.size + problem.body_body.size
     boxes = scene.fixed[shapes:]
     bodies = scene.body[len(scene.links) + shapes :] - problem.environment_bodies
@@ -108,8 +111,8 @@ def place_scene(
     work: Workspace,
     torso: int,
     scene: MotionScene,
-    boxes: FloatArray,
     moving: IntArray,
+    moved: FloatArray,
     motion: MotionWorkspace,
 ) -> None:
     """Place the shapes around the arm that are elsewhere than before.
@@ -119,11 +122,11 @@ def place_scene(
         work: Workspace with the environment in A.
         torso: Torso level.
         scene: Its centres are filled.
-        boxes: Boxes around groups of the robot's fixed shapes at each torso level.
         moving: As in `LineScene`.
+        moved: As in `LineScene`.
         motion: Its shapes are filled.
     """
-    environment, body_A, shapes = work.environment_A, problem.body_A[torso], motion.shapes
+    environment, shapes = work.environment_A, motion.shapes
     at = len(scene.links)
     for j in range(len(environment)):
         for r in range(3):
@@ -132,14 +135,9 @@ def place_scene(
         j = work.near[n]
         for c in range(COLUMNS):
             shapes[at + j, c] = environment[j, c]
-    at += len(environment)
-    for j in moving:
+    for n in range(len(moving)):
         for c in range(COLUMNS):
-            shapes[at + j, c] = body_A[j, c]
-    at += len(problem.body_body)
-    for j in range(boxes.shape[1]):
-        for c in range(COLUMNS):
-            shapes[at + j, c] = boxes[torso, j, c]
+            shapes[moving[n], c] = moved[torso, n, c]
     pair, centre = scene.pair, scene.centre
     for k in range(scene.first_pair[-1]):
         if pair[k, 2] == 0:

@@ -121,7 +121,7 @@ def _place_surroundings(problem: Problem, approach: Approach, torso: int) -> Non
     """Place everything around the arm, the base being in place."""
     environment_in_arm_base(problem, approach.work, torso)
     place_scene(
-        problem, approach.work, torso, approach.scene, approach.boxes, approach.moving,
+        problem, approach.work, torso, approach.scene, approach.moving, approach.moved,
         approach.motion,
     )  # fmt: skip
 
