@@ -14,7 +14,9 @@
                                                     these bodies to what it alone contains, and
                                                     splits up to so many that protrude most; without
                                                     bodies, those that scripts/fits.yaml names
-
+    python scripts/fit_primitives.py pr2 --split l_elbow_flex_link=6 ...     fits the shapes of
+                                                    these bodies to what random boxes can come near,
+                                                    in the end up to so many
     python scripts/fit_primitives.py ur5 --distances
                                                     measures the distances of surfaces of pairs of
                                                     bodies with at most three joints between them,
@@ -57,6 +59,7 @@ from tcs.model.robots.fitting import (
     fit_robot,
     refit,
     refit_parts,
+    split_where_struck,
     target_of,
     tightened,
 )
@@ -65,7 +68,7 @@ from tcs.model.robots.self_collision import blocked_at_boxes, blocked_by_shapes,
 
 FITS = Path(__file__).parent / "fits.yaml"
 """Bodies of the shipped robots that are not fitted as usual."""
-OPTIONS = ("--pairs", "--parts", "--tighten", "--distances")
+OPTIONS = ("--pairs", "--parts", "--tighten", "--split", "--distances")
 _NUMBERS = re.compile(r"([1-9]\d*)(?:\+([1-9]\d*))?")
 """Number of shapes of a body, and of patches."""
 
@@ -79,7 +82,7 @@ def main() -> int:
         names = [a for a in names if a.split("/") not in pairs]
     more = [a.split("=") for a in sys.argv[1:] if "=" in a]
     are_numbers = all(len(m) == 2 and _NUMBERS.fullmatch(m[1]) for m in more)
-    if "--tighten" in sys.argv:
+    if {"--tighten", "--split"} & set(sys.argv):
         are_numbers = all(len(m) == 2 and m[1].isdecimal() for m in more)
     if len(names) != 1 or not are_numbers:
         print(__doc__, file=sys.stderr)
@@ -101,6 +104,11 @@ def main() -> int:
             splits = {body: int(text) for body, text in more} or splits_of(robot)
             shapes = read_primitives(Path(robot.primitives))
             shapes = tightened(robot, shapes, splits, spots_of(robot), rounds_of(robot))
+            write_primitives(Path(robot.primitives), shapes)
+            print_blocked(robot)
+        elif "--split" in sys.argv:
+            most = {body: int(text) for body, text in more}
+            shapes = split_where_struck(robot, read_primitives(Path(robot.primitives)), most)
             write_primitives(Path(robot.primitives), shapes)
             print_blocked(robot)
         elif more:

@@ -54,6 +54,16 @@ def least_protruding(
             within &= (at >= least) & (at <= greatest)
         return float(costs[within].sum()) + per_volume * float((high - low).prod())
 
+    return least_costly(R, cost)
+
+
+def least_costly(R: FloatArray, cost: Callable[[FloatArray], float]) -> FloatArray:
+    """Return an orientation of little cost, a local minimum that is found from R.
+
+    Args:
+        R: Orientation to start from, shape (3, 3).
+        cost: Cost of an orientation.
+    """
     best, least, step = R, cost(R), _FIRST
     while step >= _LAST:
         found = _first_better(best, least, step, cost)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
@@ -11,27 +10,24 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
-from tcs.errors import RobotError, UnknownNameError
-from tcs.model.robots.cutting import cut, distinct, halved, longest_edges
-from tcs.model.robots.fitting.bounding import (
-    enclose,
-    enclose_axis,
-    hull_corners,
-    tightest_orientation,
-)
+from tcs.errors import UnknownNameError
+from tcs.model.robots.fitting.bounding import enclose
 from tcs.model.robots.fitting.candidates import thinned
 from tcs.model.robots.fitting.enclosure import surfaces_to_enclose
 from tcs.model.robots.fitting.filling import fillers
 from tcs.model.robots.fitting.orienting import least_protruding
-from tcs.model.robots.fitting.reduction import contain, contained
+from tcs.model.robots.fitting.shared_surface import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    SharedSurface,
+    around,
+    within_capsule,
+)
 from tcs.model.robots.fitting.solid import CLOSING as USUAL_CLOSING
 from tcs.model.robots.fitting.solid import Solid, measured, spaces_outside
-from tcs.model.robots.primitives import FINEST, Primitive
+from tcs.model.robots.primitives import Primitive
 from tcs.model.robots.robot_file import RobotFile
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 CLOSING = 0.005
 """Radius of the smallest ball that the space outside admits [m]: links pass each other in hollows
@@ -51,8 +47,6 @@ DEEP = 0.012
 """Depth [m] from which on the inside stays covered, and least spacing of points there."""
 SPACINGS = 20
 """Most points inside along a body."""
-_CUTS = (0.2, 0.35, 0.5, 0.65, 0.8)
-"""Where along an axis of a shape it may be split, as fractions of its extent."""
 _WORTH = 0.002
 """Least decrease of the volume outside for which a shape is split, as a fraction of all of it."""
 _NEW = 20
@@ -124,8 +118,11 @@ def _tightened_body(
     return (*tight, *fillers(body, tight, triangles))
 
 
-class Tightening:
-    """Shapes that contain a surface together, each reduced to what the others leave."""
+class Tightening(SharedSurface):
+    """Shapes that contain a surface together, each reduced to what the others leave.
+
+    What they should leave free are the cells of a grid outside the body.
+    """
 
     def __init__(
         self,
@@ -134,7 +131,7 @@ class Tightening:
         triangles: FloatArray,
         spots: Spots = (),
     ) -> None:
-        """Cut the surface into pieces that each lie in a shape.
+        """Measure the space outside, and cut the surface into pieces that each lie in a shape.
 
         Args:
             body: Name of the body.
@@ -142,135 +139,77 @@ class Tightening:
             triangles: Corners in the frame of the body [m], shape (n, 3, 3).
             spots: Where volume outside counts most.
         """
-        self._body, self._shapes = body, list(shapes)
+        shapes = tuple(shapes)
         volume = float(np.ptp(triangles, axis=(0, 1)).prod())
         pitch = max(FINEST_PITCH, float(np.cbrt(volume / (SPOT_CELLS if spots else CELLS))))
-        reach = _overhang(self._shapes, triangles)
-        self._solid, inside = _measured(triangles, pitch, reach)
+        self._solid, inside = space_of(triangles, pitch, _overhang(shapes, triangles))
         self._worth = _worth(self._solid, spots)
-        self._pieces = _pieces_in(self._shapes, triangles, max(PIECE, 2 * pitch))
-        points, index = distinct(self._pieces.reshape(-1, 3))
-        self._corners, self._index = points, index.reshape(-1, 3)
-        self._inside = inside[np.any([s.contains(inside) for s in self._shapes], axis=0)]
-        self._within = [self._contained(shape) for shape in self._shapes]
-        self._count = np.sum(self._within, axis=0)
-        self._held = np.zeros(self._solid.outside.size, np.int16)
-        self._cells = [self._outside(shape) for shape in self._shapes]
-        for cells in self._cells:
-            self._held[cells] += 1
+        longest = max(PIECE, 2 * pitch)
+        super().__init__(body, shapes, (triangles, inside), longest, self._solid.outside.size)
         self._allowed = self._held > 0
-
-    @property
-    def shapes(self) -> tuple[Primitive, ...]:
-        """The shapes."""
-        return tuple(self._shapes)
 
     @property
     def excess(self) -> float:
         """Volume of all shapes together that is outside the body [m^3]."""
         return float(np.count_nonzero(self._held)) * self._solid.pitch**3
 
-    def _volume(self, cells: IntArray) -> float:
+    def _cost(self, numbers: IntArray) -> float:
         """Return the volume of cells, with that in spots as often as it counts [m^3]."""
-        return float(self._worth[cells].sum(dtype=np.float64)) * self._solid.pitch**3
+        return float(self._worth[numbers].sum(dtype=np.float64)) * self._solid.pitch**3
 
-    def reduce(self) -> None:
-        """Reduce each shape to what it alone contains, those that protrude most first."""
-        order = np.argsort([-self._own(cells) for cells in self._cells], kind="stable")
-        unneeded = []
-        for k in order.tolist():
-            alone = np.asarray(self._within[k] & (self._count == 1))
-            self._leave_out(k)
-            if not alone.any():
-                unneeded.append(k)
-                continue
-            shape, _ = self._tightest(self._shapes[k], self._points(*self._rows(alone)))
-            self._put(k, shape)
-        for k in sorted(unneeded, reverse=True):
-            del self._shapes[k], self._within[k], self._cells[k]
-
-    def split(self, most: int) -> None:
+    def split(self, most: int, worth: float | None = None) -> None:
         """Split the shapes that protrude most in two, one after the other.
 
         Args:
             most: Largest number of shapes that are added.
+            worth: Least decrease of the volume outside for which a shape is split [m^3]; None is a
+                fraction of all of it.
         """
-        whole, end = set[int](), len(self._shapes) + most
-        least = _WORTH * self._volume(np.flatnonzero(self._held))
-        while len(self._shapes) < end:
-            costs = {k: self._own(c) for k, c in enumerate(self._cells) if k not in whole}
-            k = max(costs, key=costs.__getitem__, default=-1)
-            if k < 0 or costs[k] <= least:
-                return
-            if not self._is_split(k, costs[k] - least):
-                whole.add(k)
+        least = _WORTH * self._cost(np.flatnonzero(self._held)) if worth is None else worth
+        super().split(most, least)
 
-    def _is_split(self, k: int, allowed: float) -> bool:
-        """Split a shape if its halves protrude by at most a volume [m^3]; return whether."""
-        alone = np.asarray(self._within[k] & (self._count == 1))
-        if not alone.any():
-            return False
-        whole = self._shapes[k]
-        self._leave_out(k)
+    def _halved(
+        self, shape: Primitive, alone: BoolArray, allowed: float
+    ) -> tuple[Primitive, Primitive] | None:
         # Halves lie within the box around all, so that it has all cells in which they can protrude.
-        around = self._points(*self._rows(alone))
-        cells = self._outside(enclose(self._body, around, "box", whole.rotation))
+        points = self._points(*self._rows(alone))
+        cells = self._held_by(enclose(self._body, points, "box", shape.rotation))
         cells = cells[self._held[cells] == 0]
         protruding = self._positions(cells)
         best, least = None, allowed
-        for halves in self._halves(whole, alone):
-            boxes = [enclose(self._body, points, "box", whole.rotation) for points in halves]
+        for halves in self._parted(shape, alone):
+            boxes = [enclose(self._body, points, "box", shape.rotation) for points in halves]
             left = np.any([box.contains(protruding) for box in boxes], axis=0)
             tried = [(boxes, cells[left])]
-            if whole.kind == "capsule":
+            if shape.kind == "capsule":
                 # Boxes around slices of a round body have corners.
-                capsules = [_within_capsule(whole, points) for points in halves]
-                both = np.concatenate([self._outside(capsule) for capsule in capsules])
+                capsules = [within_capsule(shape, points) for points in halves]
+                both = np.concatenate([self._held_by(capsule) for capsule in capsules])
                 tried.append((capsules, np.unique(both)))
             for shapes, protruded in tried:
                 added = self._added(protruded)
                 if added < least:
                     best, least = list(zip(shapes, halves, strict=True)), added
         if best is None:
-            self._put(k, whole)
-            return False
+            return None
         (first, own), (second, rest) = best
-        self._put(k, self._tightest(first, own)[0])
-        self._shapes.append(second)
-        self._within.append(np.zeros_like(alone))
-        self._cells.append(np.empty(0, np.int64))
-        self._put(len(self._shapes) - 1, self._tightest(second, rest)[0])
-        return True
+        first = self._tightest(first, own)
+        # The second is not to hold what the first does already.
+        held = self._held_by(first)
+        self._held[held] += 1
+        second = self._tightest(second, rest)
+        self._held[held] -= 1
+        return first, second
 
-    def _halves(self, shape: Primitive, alone: BoolArray) -> Iterable[list[FloatArray]]:
-        """Yield the points of what a shape alone contains, on both sides of cuts across it."""
-        rows, deep_rows = self._rows(alone)
-        seen = self._pieces[rows].mean(axis=1) @ shape.rotation
-        deep = self._inside[deep_rows] @ shape.rotation
-        if not len(seen):
-            return
-        low, high = seen.min(axis=0), seen.max(axis=0)
-        for axis, fraction in itertools.product(range(3), _CUTS):
-            at = low[axis] + fraction * (high[axis] - low[axis])
-            first, second = seen[:, axis] <= at, deep[:, axis] <= at
-            halves = [
-                self._points(rows[some], deep_rows[deeper])
-                for some, deeper in ((first, second), (~first, ~second))
-            ]
-            if all(map(len, halves)):
-                yield halves
-
-    def _tightest(self, shape: Primitive, points: FloatArray) -> tuple[Primitive, float]:
-        """Return the shape around points that protrudes least where no other one does [m^3]."""
-        tried = [shape, *_around(self._body, shape, points)]
+    def _tightest(self, shape: Primitive, points: FloatArray) -> Primitive:
+        tried = [shape, *around(self._body, shape, points)]
         outside, costs = self._bare_near(points)
         starts = {box.quaternion: box.rotation for box in tried if box.kind == "box"}
         for start in starts.values():
             R = least_protruding(points, start, outside, costs, _INSIDE)
             tried.append(enclose(self._body, points, "box", R))
-        total = [self._added(self._outside(s)) + _INSIDE * s.volume for s in tried]
-        best = int(np.argmin(total))
-        return tried[best], total[best]
+        total = [self._added(self._held_by(s)) + _INSIDE * s.volume for s in tried]
+        return tried[int(np.argmin(total))]
 
     def _bare_near(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return cells near points that no shape contains, and what each costs.
@@ -290,36 +229,11 @@ class Tightening:
         counts = np.where(allowed[bare], 1.0, 1.0 + _NEW)
         return (cells + first) * solid.pitch + solid.origin, counts * solid.pitch**3
 
-    def _points(self, pieces: IntArray, inside: IntArray) -> FloatArray:
-        """Return the corners of pieces and the points inside of given numbers, shape (n, 3)."""
-        used = np.zeros(len(self._corners), np.bool_)
-        used[self._index[pieces]] = True
-        return hull_corners(np.concatenate([self._corners[used], self._inside[inside]]))
-
     def _positions(self, cells: IntArray) -> FloatArray:
         """Return the positions of cells [m], shape (n, 3)."""
         solid = self._solid
         at = np.stack(np.unravel_index(cells, solid.outside.shape), axis=1)
         return np.asarray(at * solid.pitch + solid.origin)
-
-    def _rows(self, chosen: BoolArray) -> tuple[IntArray, IntArray]:
-        """Return the numbers of the pieces and of the points inside that are chosen."""
-        n = len(self._pieces)
-        return np.flatnonzero(chosen[:n]), np.flatnonzero(chosen[n:])
-
-    def _leave_out(self, k: int) -> None:
-        self._count -= self._within[k]
-        self._held[self._cells[k]] -= 1
-
-    def _put(self, k: int, shape: Primitive) -> None:
-        self._shapes[k] = shape
-        self._within[k], self._cells[k] = self._contained(shape), self._outside(shape)
-        self._count += self._within[k]
-        self._held[self._cells[k]] += 1
-
-    def _own(self, cells: IntArray) -> float:
-        """Return the volume of the cells that one shape alone contains [m^3]."""
-        return self._volume(cells[self._held[cells] == 1])
 
     def _added(self, cells: IntArray) -> float:
         """Return the volume of the cells that no shape contains [m^3].
@@ -327,13 +241,9 @@ class Tightening:
         Those that no shape contained at first count as many times as is needed to avoid them.
         """
         bare = cells[self._held[cells] == 0]
-        return self._volume(bare) + _NEW * self._volume(bare[~self._allowed[bare]])
+        return self._cost(bare) + _NEW * self._cost(bare[~self._allowed[bare]])
 
-    def _contained(self, shape: Primitive) -> BoolArray:
-        return np.concatenate([contained(shape, self._pieces), shape.contains(self._inside)])
-
-    def _outside(self, shape: Primitive) -> IntArray:
-        """Return the cells outside the body that a shape contains, shape (n,)."""
+    def _held_by(self, shape: Primitive) -> IntArray:
         solid = self._solid
         around, first = solid.between(*shape.bounds)
         cells = np.argwhere(solid.outside[around] > 0.0) + first
@@ -341,7 +251,7 @@ class Tightening:
         return np.asarray(np.ravel_multi_index(tuple(cells.T), solid.outside.shape))
 
 
-def _measured(triangles: FloatArray, pitch: float, reach: float) -> tuple[Solid, FloatArray]:
+def space_of(triangles: FloatArray, pitch: float, reach: float) -> tuple[Solid, FloatArray]:
     """Return the space of a body, and points deep inside it that shapes should keep covered.
 
     Args:
@@ -375,56 +285,8 @@ def _worth(solid: Solid, spots: Spots) -> NDArray[np.float32]:
     return worth.ravel()
 
 
-def _overhang(shapes: list[Primitive], triangles: FloatArray) -> float:
+def _overhang(shapes: Iterable[Primitive], triangles: FloatArray) -> float:
     """Return how far shapes reach beyond the box around triangles [m]."""
     low, high = np.array([shape.bounds for shape in shapes]).swapaxes(0, 1)
     below = triangles.min(axis=(0, 1)) - low.min(axis=0)
     return float(max(0.0, *below, *(high.max(axis=0) - triangles.max(axis=(0, 1)))))
-
-
-def _pieces_in(shapes: list[Primitive], triangles: FloatArray, longest: float) -> FloatArray:
-    """Return pieces of triangles that each lie in a shape, shape (n, 3, 3)."""
-    left, found = cut(triangles, longest), []
-    while len(left):
-        whole = contain(shapes, left)
-        found.append(left[whole])
-        left = left[~whole]
-        corners = left.reshape(-1, 3)
-        bare = ~np.any([shape.contains(corners) for shape in shapes], axis=0)
-        if bare.any() or (longest_edges(left) < FINEST).any():
-            at = np.round(corners[bare.argmax()], 3).tolist()
-            raise RobotError(
-                f"primitives of body '{shapes[0].body}' do not enclose its surface near {at} m in "
-                "its frame: fit the body again first."
-            )
-        left = halved(left)
-    return np.concatenate(found)
-
-
-def _around(body: str, shape: Primitive, points: FloatArray) -> list[Primitive]:
-    """Return shapes that contain points of a shape: boxes, and a capsule within a capsule."""
-    found = [
-        enclose(body, points, "box", R) for R in (shape.rotation, tightest_orientation(points))
-    ]
-    if shape.kind == "capsule":
-        found.append(_within_capsule(shape, points))
-        found.append(enclose(body, points, "capsule", shape.rotation))
-    return found
-
-
-def _within_capsule(shape: Primitive, points: FloatArray) -> Primitive:
-    """Return a capsule around the points of a capsule, on its axis."""
-    radius, length = shape.size
-    seen = (points - np.array(shape.xyz)) @ shape.rotation
-    off_axis = np.square(seen[:, :2]).sum(axis=1)
-    beyond = np.maximum(np.abs(seen[:, 2]) - length / 2, 0.0)
-    radius = float(np.sqrt(off_axis + beyond**2).max())
-    reach = np.sqrt(np.maximum(radius**2 - off_axis, 0.0))
-    top = min(float((seen[:, 2] - reach).max()), length / 2)
-    bottom = max(float((seen[:, 2] + reach).min()), -length / 2)
-    axis = shape.rotation[:, 2]
-    ends = np.array(shape.xyz) + np.array([[bottom], [max(top, bottom)]]) * axis
-    tight = enclose_axis(body=shape.body, first=ends[0], last=ends[1], radius=radius)
-    tight = replace(tight, quaternion=shape.quaternion)
-    out = float(tight.distance(points).max())
-    return tight.shrunk(-np.ceil(out * 1e6 + 1) * 1e-6) if out > 0 else tight

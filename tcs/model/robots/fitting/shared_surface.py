@@ -1,0 +1,257 @@
+"""Shapes that contain a surface together: what each alone contains, and how it is split in two."""
+
+from __future__ import annotations
+
+import itertools
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.errors import RobotError
+from tcs.model.robots.cutting import cut, distinct, halved, longest_edges
+from tcs.model.robots.fitting.bounding import (
+    enclose,
+    enclose_axis,
+    hull_corners,
+    tightest_orientation,
+)
+from tcs.model.robots.fitting.reduction import contain, contained
+from tcs.model.robots.primitives import FINEST, Primitive
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+_CUTS = (0.2, 0.35, 0.5, 0.65, 0.8)
+"""Where along an axis of a shape it may be split, as fractions of its extent."""
+
+
+class SharedSurface(ABC):
+    """Shapes that contain a surface together, each of which may change as long as they do.
+
+    What shapes should leave free is numbered by whoever derives from this, such as the cells of a
+    grid outside the body. What a shape holds of it has a cost unless another one holds it too.
+    """
+
+    def __init__(
+        self,
+        body: str,
+        shapes: Iterable[Primitive],
+        surface: tuple[FloatArray, FloatArray],
+        longest: float,
+        count: int,
+    ) -> None:
+        """Cut the surface into pieces that each lie in a shape.
+
+        Args:
+            body: Name of the body.
+            shapes: Shapes that enclose the surface.
+            surface: Corners of its triangles in the frame of the body [m], shape (n, 3, 3), and
+                points inside of which those that shapes contain stay contained, shape (m, 3).
+            longest: Longest edge of a piece [m]; pieces that no shape contains are cut further.
+            count: Number of what shapes should leave free.
+
+        Raises:
+            RobotError: If the shapes leave a part of the surface bare.
+        """
+        triangles, inside = surface
+        self._body, self._shapes = body, list(shapes)
+        self._pieces = _pieces_in(self._shapes, triangles, longest)
+        points, index = distinct(self._pieces.reshape(-1, 3))
+        self._corners, self._index = points, index.reshape(-1, 3)
+        self._inside = inside[np.any([s.contains(inside) for s in self._shapes], axis=0)]
+        self._within = [self._contained(shape) for shape in self._shapes]
+        self._count = np.sum(self._within, axis=0)
+        self._held = np.zeros(count, np.int32)
+        self._holds = [self._held_by(shape) for shape in self._shapes]
+        for numbers in self._holds:
+            self._held[numbers] += 1
+
+    @abstractmethod
+    def _held_by(self, shape: Primitive) -> IntArray:
+        """Return the numbers of what a shape holds and should leave free, shape (n,)."""
+
+    @abstractmethod
+    def _cost(self, numbers: IntArray) -> float:
+        """Return the cost of holding what has these numbers, in a unit of the class."""
+
+    @abstractmethod
+    def _tightest(self, shape: Primitive, points: FloatArray) -> Primitive:
+        """Return the shape around points of a shape whose cost is least."""
+
+    @abstractmethod
+    def _halved(
+        self, shape: Primitive, alone: BoolArray, allowed: float
+    ) -> tuple[Primitive, Primitive] | None:
+        """Return two shapes in place of one that is left out, None if all cost too much."""
+
+    @property
+    def shapes(self) -> tuple[Primitive, ...]:
+        """The shapes."""
+        return tuple(self._shapes)
+
+    def reduce(self) -> None:
+        """Reduce each shape to what it alone contains, those that cost most first."""
+        order = np.argsort([-self._own(numbers) for numbers in self._holds], kind="stable")
+        unneeded = []
+        for k in order.tolist():
+            alone = self._alone(k)
+            self._leave_out(k)
+            if not alone.any():
+                unneeded.append(k)
+                continue
+            self._put(k, self._tightest(self._shapes[k], self._points(*self._rows(alone))))
+        for k in sorted(unneeded, reverse=True):
+            self._remove(k)
+
+    def split(self, most: int, worth: float) -> None:
+        """Split the shapes that cost most in two, one after the other.
+
+        Args:
+            most: Largest number of shapes that are added.
+            worth: Least decrease of the cost for which a shape is split.
+        """
+        whole, end = set[int](), len(self._shapes) + most
+        while len(self._shapes) < end:
+            costs = {k: self._own(n) for k, n in enumerate(self._holds) if k not in whole}
+            k = max(costs, key=costs.__getitem__, default=-1)
+            if k < 0 or costs[k] <= worth:
+                return
+            if not self._is_split(k, costs[k] - worth):
+                whole.add(k)
+
+    def _is_split(self, k: int, allowed: float) -> bool:
+        """Split a shape if its halves cost at most so much; return whether."""
+        alone = self._alone(k)
+        if not alone.any():
+            return False
+        shape = self._shapes[k]
+        self._leave_out(k)
+        halves = self._halved(shape, alone, allowed)
+        if halves is None:
+            self._put(k, shape)
+            return False
+        self._put(k, halves[0])
+        self._append(halves[1])
+        return True
+
+    def _parted(self, shape: Primitive, alone: BoolArray) -> Iterator[list[FloatArray]]:
+        """Yield the points of what a shape alone contains, on both sides of cuts across it."""
+        rows, deep_rows = self._rows(alone)
+        seen = self._pieces[rows].mean(axis=1) @ shape.rotation
+        deep = self._inside[deep_rows] @ shape.rotation
+        if not len(seen):
+            return
+        low, high = seen.min(axis=0), seen.max(axis=0)
+        for axis, fraction in itertools.product(range(3), _CUTS):
+            at = low[axis] + fraction * (high[axis] - low[axis])
+            first, second = seen[:, axis] <= at, deep[:, axis] <= at
+            halves = [
+                self._points(rows[some], deep_rows[deeper])
+                for some, deeper in ((first, second), (~first, ~second))
+            ]
+            if all(map(len, halves)):
+                yield halves
+
+    def _points(self, pieces: IntArray, inside: IntArray) -> FloatArray:
+        """Return the corners of pieces and the points inside of given numbers, shape (n, 3)."""
+        used = np.zeros(len(self._corners), np.bool_)
+        used[self._index[pieces]] = True
+        return hull_corners(np.concatenate([self._corners[used], self._inside[inside]]))
+
+    def _rows(self, chosen: BoolArray) -> tuple[IntArray, IntArray]:
+        """Return the numbers of the pieces and of the points inside that are chosen."""
+        n = len(self._pieces)
+        return np.flatnonzero(chosen[:n]), np.flatnonzero(chosen[n:])
+
+    def _alone(self, k: int) -> BoolArray:
+        """Return which pieces and points inside one shape alone contains."""
+        return np.asarray(self._within[k] & (self._count == 1))
+
+    def _leave_out(self, k: int) -> None:
+        self._count -= self._within[k]
+        self._held[self._holds[k]] -= 1
+
+    def _put(self, k: int, shape: Primitive) -> None:
+        self._shapes[k] = shape
+        self._within[k], self._holds[k] = self._contained(shape), self._held_by(shape)
+        self._put_back(k)
+
+    def _put_back(self, k: int) -> None:
+        """Put a shape back that was left out."""
+        self._count += self._within[k]
+        self._held[self._holds[k]] += 1
+
+    def _append(self, shape: Primitive) -> None:
+        self._shapes.append(shape)
+        self._within.append(np.zeros(len(self._count), np.bool_))
+        self._holds.append(np.empty(0, np.int64))
+        self._put(len(self._shapes) - 1, shape)
+
+    def _remove(self, k: int) -> None:
+        """Remove a shape that is left out."""
+        del self._shapes[k], self._within[k], self._holds[k]
+
+    def _own(self, numbers: IntArray) -> float:
+        """Return the cost of what one shape alone holds."""
+        return self._cost(numbers[self._held[numbers] == 1])
+
+    def _contained(self, shape: Primitive) -> BoolArray:
+        return np.concatenate([contained(shape, self._pieces), shape.contains(self._inside)])
+
+
+def around(body: str, shape: Primitive, points: FloatArray) -> list[Primitive]:
+    """Return shapes that contain points of a shape: boxes, and capsules within a capsule.
+
+    Args:
+        body: Name of the body.
+        shape: The shape.
+        points: In the frame of the body [m], shape (n, 3).
+    """
+    found = [
+        enclose(body, points, "box", R) for R in (shape.rotation, tightest_orientation(points))
+    ]
+    if shape.kind == "capsule":
+        found.append(within_capsule(shape, points))
+        found.append(enclose(body, points, "capsule", shape.rotation))
+    return found
+
+
+def within_capsule(shape: Primitive, points: FloatArray) -> Primitive:
+    """Return a capsule around some points of a capsule [m], shape (n, 3), on its axis."""
+    radius, length = shape.size
+    seen = (points - np.array(shape.xyz)) @ shape.rotation
+    off_axis = np.square(seen[:, :2]).sum(axis=1)
+    beyond = np.maximum(np.abs(seen[:, 2]) - length / 2, 0.0)
+    radius = float(np.sqrt(off_axis + beyond**2).max())
+    reach = np.sqrt(np.maximum(radius**2 - off_axis, 0.0))
+    top = min(float((seen[:, 2] - reach).max()), length / 2)
+    bottom = max(float((seen[:, 2] + reach).min()), -length / 2)
+    axis = shape.rotation[:, 2]
+    ends = np.array(shape.xyz) + np.array([[bottom], [max(top, bottom)]]) * axis
+    tight = enclose_axis(body=shape.body, first=ends[0], last=ends[1], radius=radius)
+    tight = replace(tight, quaternion=shape.quaternion)
+    out = float(tight.distance(points).max())
+    return tight.shrunk(-np.ceil(out * 1e6 + 1) * 1e-6) if out > 0 else tight
+
+
+def _pieces_in(shapes: list[Primitive], triangles: FloatArray, longest: float) -> FloatArray:
+    """Return pieces of triangles that each lie in a shape, shape (n, 3, 3)."""
+    left, found = cut(triangles, longest), []
+    while len(left):
+        whole = contain(shapes, left)
+        found.append(left[whole])
+        left = left[~whole]
+        corners = left.reshape(-1, 3)
+        bare = ~np.any([shape.contains(corners) for shape in shapes], axis=0)
+        if bare.any() or (longest_edges(left) < FINEST).any():
+            at = np.round(corners[bare.argmax()], 3).tolist()
+            raise RobotError(
+                f"primitives of body '{shapes[0].body}' do not enclose its surface near {at} m in "
+                "its frame: fit the body again first."
+            )
+        left = halved(left)
+    return np.concatenate(found)
