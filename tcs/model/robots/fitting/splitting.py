@@ -32,7 +32,7 @@ from tcs.model.robots.fitting.tightening import space_of
 from tcs.model.robots.primitives import Primitive
 from tcs.model.robots.robot_file import RobotFile
 
-DRAWS = 200_000
+DRAWS = 300_000
 """Boxes that are drawn about a body."""
 CELLS = 300_000
 """Most points of the grid in the box around a body that tells where its inside is."""
@@ -41,18 +41,17 @@ PIECES = 80
 GUARDED = 0.005
 """Distance from all shapes [m] up to which new ones should not protrude: where two bodies pass each
 other, what their shapes leave free now is in use."""
-GUARDS = 6000
+GUARDS = 20_000
 """Most points there by which that is noticed."""
-_GUARD = 3e-4
-"""Cost of such a point in a new shape, as a fraction of the boxes near: six thousand of them are
-worth nearly twice as much as all boxes."""
+_GUARD = 1e-3
+"""Cost of such a point in a new shape, as a fraction of the boxes near."""
 _GRID = 500_000
 """Most points of the grid in the box around all shapes from which those are taken."""
 _TOUCHING = 1e-4
 """Distance within which a point counts as being in a shape [m]: rounding may take a shape there."""
-_WORTH = 0.002
+_WORTH = 0.0006
 """Least decrease of the cost for which a shape is split, as a fraction of the boxes near."""
-_MERGED = 0.001
+_MERGED = 0.0004
 """Greatest increase of the cost for which a shape is saved, as such a fraction."""
 _ROUND = 16
 """Most shapes that are split before all are reduced again."""
