@@ -11,6 +11,7 @@ from typing import Concatenate, ParamSpec, TypeVar
 
 P = ParamSpec("P")
 R = TypeVar("R")
+F = TypeVar("F", bound=Path | tuple[Path, ...])
 _Status = tuple[int, int, int, int, int]
 
 YOUNG = 100_000_000
@@ -23,8 +24,8 @@ the second would not show.
 
 def kept_while_unchanged(
     files: int,
-) -> Callable[[Callable[Concatenate[Path, P], R]], Callable[Concatenate[Path, P], R]]:
-    """Return a decorator for functions of the content of a file and hashable further arguments.
+) -> Callable[[Callable[Concatenate[F, P], R]], Callable[Concatenate[F, P], R]]:
+    """Return a decorator for functions of the content of files and hashable further arguments.
 
     A process that runs for days, such as the service, must not answer with a mesh or a URDF that
     has been replaced since. A file counts as unchanged while its place on the disk, its size and
@@ -34,23 +35,26 @@ def kept_while_unchanged(
         files: Most results to keep; the one that was not asked for the longest goes first.
 
     Returns:
-        A decorator for functions whose first argument is the path. Results are shared between
-        callers, which must not change them.
+        A decorator for functions whose first argument is the path, or a tuple of paths. Results
+        are shared between callers, which must not change them.
     """
 
     def decorated(
-        function: Callable[Concatenate[Path, P], R],
-    ) -> Callable[Concatenate[Path, P], R]:
+        function: Callable[Concatenate[F, P], R],
+    ) -> Callable[Concatenate[F, P], R]:
         @functools.lru_cache(maxsize=files)
-        def kept(_: _Status, path: Path, *args: P.args, **kwargs: P.kwargs) -> R:
+        def kept(_: tuple[_Status, ...], path: F, *args: P.args, **kwargs: P.kwargs) -> R:
             return function(path, *args, **kwargs)
 
         @functools.wraps(function)
-        def wrapped(path: Path, /, *args: P.args, **kwargs: P.kwargs) -> R:
-            status = _status(path)
-            if status is None:
-                return function(path, *args, **kwargs)
-            return kept(status, path, *args, **kwargs)  # type: ignore[arg-type]
+        def wrapped(path: F, /, *args: P.args, **kwargs: P.kwargs) -> R:
+            statuses = []
+            for file in path if isinstance(path, tuple) else (path,):
+                status = _status(file)
+                if status is None:
+                    return function(path, *args, **kwargs)
+                statuses.append(status)
+            return kept(tuple(statuses), path, *args, **kwargs)  # type: ignore[arg-type]
 
         return wrapped
 

@@ -72,7 +72,7 @@ class DraftOptions:
         collision_meshes: Whether the collision geometry of a link, if there is any, is its whole
             surface.
         ignore: Links that nothing is checked against.
-        jobs: Number of processes that fit shapes and tighten them.
+        jobs: Number of processes that fit shapes, tighten them and compare pairs of bodies.
     """
 
     base: str | None = None
@@ -159,7 +159,8 @@ def draft_robot(
         fits = fit_robot(robot, steps.bodies, coarse=options.coarse, jobs=options.jobs)
         primitives = tuple(shape for found in fits for shape in found.fit.primitives)
         write_primitives(shapes, primitives)
-        robot = robot.model_copy(update={"disabled_groups": propose_disabled_pairs(robot)})
+        pairs = propose_disabled_pairs(robot, jobs=options.jobs)
+        robot = robot.model_copy(update={"disabled_groups": pairs})
         steps.test_done()
         rest = free_posture(robot)
         robot = robot.model_copy(update={"rest": rest or {}})

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import delayed
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -17,6 +17,7 @@ from tcs.model.robots.fitting.bounding import corner_points, enclose, hull_volum
 from tcs.model.robots.fitting.covering import Fit, Target, fit_triangles
 from tcs.model.robots.fitting.enclosure import surfaces_to_enclose
 from tcs.model.robots.fitting.parts import Part, refit_part
+from tcs.model.robots.fitting.processes import unordered
 from tcs.model.robots.primitives import Primitive, read_primitives, union_volume
 from tcs.model.robots.robot_file import RobotFile
 from tcs.model.robots.urdf import Urdf
@@ -145,7 +146,7 @@ def _fitted(
     if on_progress is not None:
         on_progress(done, total)
     calls = (delayed(_named_fit)(*task) for task in tasks)
-    for body, fit in Parallel(jobs, return_as="generator_unordered")(calls):
+    for body, fit in unordered(jobs, calls):
         fits[body] = fit
         if on_progress is not None:
             on_progress(done + len(fits), total)

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
+from tcs.kernel.enclosing.holding import circle_around
+from tcs.kernel.enclosing.orienting import tightest_rectangles
 from tcs.model.robots.cutting import distinct
 from tcs.model.robots.primitives import Primitive, rotation_of
 
@@ -26,6 +28,8 @@ _FACETS = 32
 and a coarse estimate rules out most of them."""
 _COARSE_ANGLES = np.linspace(0.0, np.pi / 2, 6, endpoint=False)
 """Angles about the normal of a facet at which its box is estimated [rad]."""
+_CIRCLE_STEPS = 2000
+"""Steps toward the smallest circle around points."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,10 +94,11 @@ def tightest_orientation(points: FloatArray) -> FloatArray:
     best, best_volume = np.eye(3), math.inf
     normals = np.unique(np.round(hull.equations[:, :3], 6), axis=0)
     frames = _frames_with_z(normals / np.linalg.norm(normals, axis=1, keepdims=True))
-    for frame in _promising(points[hull.vertices], frames):
-        seen = points @ frame
-        angle, area = _tightest_rectangle(seen[:, :2])
-        volume = area * float(np.ptp(seen[:, 2]))
+    corners = points[hull.vertices]
+    chosen = _promising(corners, frames)
+    angles, areas = tightest_rectangles(corners, np.ascontiguousarray(chosen))
+    for frame, angle, area in zip(chosen, angles.tolist(), areas.tolist(), strict=True):
+        volume = area * float(np.ptp(corners @ frame[:, 2]))
         # A margin, so that the result does not depend on rounding.
         if volume < best_volume * (1 - 1e-9):
             best_volume = volume
@@ -117,9 +122,9 @@ def best_candidate(points: FloatArray, orientations: FloatArray) -> Candidate:
         frame = np.roll(R, 2 - axis, axis=1)
         # A lower bound of the volume first, because finding the circle is slow.
         width, height = np.ptp(points @ frame[:, :2], axis=0).max(), np.ptp(points @ frame[:, 2])
-        if _capsule_volume(width / 2, max(height - width, 0.0)) < smallest.volume:
+        if capsule_volume(width / 2, max(height - width, 0.0)) < smallest.volume:
             radius, length, _ = _capsule_around(points, frame)
-            volume = _capsule_volume(radius, length)
+            volume = capsule_volume(radius, length)
             if volume < smallest.volume:
                 smallest = Candidate("capsule", frame, volume)
     return smallest
@@ -219,7 +224,8 @@ def _box_volume(points: FloatArray, R: FloatArray) -> float:
     return float(np.ptp(points @ R, axis=0).prod())
 
 
-def _capsule_volume(radius: float, length: float) -> float:
+def capsule_volume(radius: float, length: float) -> float:
+    """Return the volume of a capsule whose cap centres are a length apart [m^3]."""
     return math.pi * radius**2 * (length + 4 / 3 * radius)
 
 
@@ -250,43 +256,13 @@ def _promising(points: FloatArray, frames: FloatArray) -> FloatArray:
     return np.asarray(frames[chosen])
 
 
-def _tightest_rectangle(points: FloatArray) -> tuple[float, float]:
-    """Return angle [rad] and area [m^2] of the smallest rectangle around points, shape (m, 2)."""
-    try:
-        corners = points[ConvexHull(points).vertices]
-    except QhullError:
-        return 0.0, float(np.ptp(points, axis=0).prod())
-    edges = np.roll(corners, -1, axis=0) - corners
-    angles = np.arctan2(edges[:, 1], edges[:, 0])
-    along = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
-    areas = np.ptp(along @ corners.T, axis=1) * np.ptp(across @ corners.T, axis=1)
-    i = int(np.argmin(areas))
-    return float(angles[i]), float(areas[i])
-
-
 def _capsule_around(points: FloatArray, R: FloatArray) -> tuple[float, float, FloatArray]:
     """Return radius, length between cap centres and centre of a capsule along the z axis of R."""
     seen = points @ R
-    middle, radius = _circle_around(seen[:, :2])
+    middle, radius = circle_around(np.ascontiguousarray(seen[:, :2]), _CIRCLE_STEPS)
     off_axis = np.square(seen[:, :2] - middle).sum(axis=1)
     # Largest axial distance from a point to a cap centre whose cap contains it.
     reach = np.sqrt(np.maximum(radius**2 - off_axis, 0.0))
     top, bottom = float((seen[:, 2] - reach).max()), float((seen[:, 2] + reach).min())
     centre = R @ np.array([*middle, (top + bottom) / 2])
     return radius, max(top - bottom, 0.0), centre
-
-
-def _circle_around(points: FloatArray, steps: int = 2000) -> tuple[FloatArray, float]:
-    """Return centre and radius of a circle around points, shape (m, 2), nearly the smallest.
-
-    Source:
-        Badoiu and Clarkson, "Smaller core-sets for balls", 2003: step toward the farthest point
-        by a decreasing fraction of the distance; the relative error of the radius is below
-        1/steps.
-    """
-    centre = points.mean(axis=0)
-    for i in range(1, steps):
-        farthest = points[int(np.argmax(np.square(points - centre).sum(axis=1)))]
-        centre = centre + (farthest - centre) / (i + 1)
-    return centre, float(np.sqrt(np.square(points - centre).sum(axis=1).max()))

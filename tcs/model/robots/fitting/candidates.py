@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tcs.model.robots.fitting.bounding import enclose, enclose_axis
-from tcs.model.robots.fitting.growth import boxes_in, capsules_in
+from tcs.kernel.enclosing.holding import chosen_covers, in_boxes, in_capsules
+from tcs.model.robots.fitting.bounding import capsule_volume, enclose, enclose_axis
+from tcs.model.robots.fitting.growth import boxes_in, capsules_in, extremes
 from tcs.model.robots.fitting.reduction import contain
 from tcs.model.robots.fitting.solid import Solid
 from tcs.model.robots.primitives import Primitive
@@ -27,8 +28,8 @@ _COVERED = 0.99
 """Fraction of those pieces at which no further shape is added: the nearest one grows."""
 _ROUNDS = 4
 """Rounds of shapes that grow from what those before leave bare."""
-_INSIDE_WEIGHT = 0.05
-"""Weight of a point inside, that of a piece of the surface being 1."""
+_PIECE_WEIGHT = 20
+"""Weight of a piece of the surface, that of a point inside being 1."""
 
 
 class Candidates:
@@ -49,37 +50,33 @@ class Candidates:
         self._body = body
         self._pieces = len(pieces)
         self._points = np.concatenate([pieces.reshape(-1, 3), inside])
-        self._weights = np.repeat([1.0, _INSIDE_WEIGHT], [len(pieces), len(inside)])
+        self._weights = np.repeat([_PIECE_WEIGHT, 1], [len(pieces), len(inside)])
         seeds = np.concatenate([pieces.mean(axis=1), inside])
         self._boxes: list[tuple[FloatArray, FloatArray]] = []
-        covered, within = [], solid.points(solid.outside <= protrusion)
+        covered, volumes, corners = [], [], extremes(solid, protrusion)
         for R in orientations:
             drawn = seeds[rng.choice(len(seeds), _SEEDS)]
-            ends = boxes_in(solid, protrusion, within, R, drawn, rng)
+            ends = boxes_in(solid, protrusion, corners, R, drawn, rng)
             self._boxes += [(R, box) for box in ends]
+            volumes.append((ends[:, 1] - ends[:, 0]).prod(axis=1))
             covered.append(self._in_boxes(R, ends))
         tried = _CAPSULES if capsules else 0
         self._capsules = list(zip(*capsules_in(solid, protrusion, tried, rng), strict=True))
         covered.append(self._in_capsules())
         self._covered = np.concatenate(covered)
+        volumes += [
+            np.array([capsule_volume(radius, float(np.linalg.norm(last - first)))])
+            for first, last, radius in self._capsules
+        ]
+        self._order = np.argsort(np.concatenate(volumes), kind="stable")
 
     def chosen(self, most: int) -> list[Primitive]:
-        """Return the shapes that cover most, each what those before it leave."""
-        items, weights = self._covered.shape[1], self._weights.astype(np.float32)
-        left = np.ones(items, np.bool_)
-        gain = self._covered.astype(np.float32) @ weights
-        # Rows of items: what a shape covers is subtracted from the others' gain.
-        by_item = self._covered.T.copy()
-        shapes: list[Primitive] = []
-        while len(shapes) < most and left[: self._pieces].mean() > 1 - _COVERED:
-            best = int(np.argmax(gain))
-            new = self._covered[best] & left
-            if not new.any():
-                break
-            shapes.append(self._shape(best))
-            left &= ~new
-            gain -= weights[new] @ by_item[new].astype(np.float32)
-        return shapes
+        """Return the shapes that cover most, each what those before it leave, or the smallest."""
+        left_out = int((1 - _COVERED) * self._pieces)
+        best = chosen_covers(
+            self._covered, self._order, self._weights, self._pieces, most, left_out
+        )
+        return [self._shape(index) for index in best.tolist()]
 
     def _shape(self, index: int) -> Primitive:
         if index < len(self._boxes):
@@ -91,34 +88,21 @@ class Candidates:
 
     def _in_boxes(self, R: FloatArray, ends: FloatArray) -> BoolArray:
         """Return what boxes with given axes and ends contain, shape (boxes, items)."""
-        seen, ends = (self._points @ R).astype(np.float32), ends.astype(np.float32)
+        seen = (self._points @ R).astype(np.float32)
         corners = 3 * self._pieces
         a, b, c = (seen[k:corners:3] for k in range(3))
         # By coordinate: NumPy is slow along an axis of three.
-        low = np.concatenate([np.minimum(np.minimum(a, b), c), seen[corners:]]).T.copy()
-        high = np.concatenate([np.maximum(np.maximum(a, b), c), seen[corners:]]).T.copy()
-        found = np.ones((len(ends), len(self._weights)), np.bool_)
-        for within, (least, greatest) in zip(found, ends, strict=True):
-            for k in range(3):
-                within &= low[k] >= least[k]
-                within &= high[k] <= greatest[k]
-        return found
+        low = np.concatenate([np.minimum(np.minimum(a, b), c), seen[corners:]])
+        high = np.concatenate([np.maximum(np.maximum(a, b), c), seen[corners:]])
+        return in_boxes(ends.astype(np.float32), low, high)
 
     def _in_capsules(self) -> BoolArray:
-        found = []
-        for first, last, radius in self._capsules:
-            along, out = last - first, self._points - first
-            square = float(along @ along)
-            t = np.clip(out @ along / square, 0.0, 1.0) if square else np.zeros(len(out))
-            away = out - t[:, None] * along
-            found.append(self._items(np.einsum("ni,ni->n", away, away) <= radius**2))
-        return np.array(found, np.bool_).reshape(-1, len(self._weights))
-
-    def _items(self, contained: BoolArray) -> BoolArray:
-        """Return which pieces and points inside are contained, given their corners."""
+        """Return what capsules contain, shape (capsules, items)."""
+        ends = np.array([capsule[:2] for capsule in self._capsules]).reshape(-1, 2, 3)
+        radii = np.array([capsule[2] for capsule in self._capsules], np.float64)
         corners = 3 * self._pieces
-        whole = contained[:corners].reshape(-1, 3).all(axis=1)
-        return np.concatenate([whole, contained[corners:]])
+        pieces = self._points[:corners].reshape(-1, 3, 3)
+        return in_capsules(ends, radii, pieces, self._points[corners:])
 
 
 def orientations(tight: FloatArray) -> FloatArray:

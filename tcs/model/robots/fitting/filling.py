@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from tcs.model.robots.cutting import distinct
+from tcs.kernel.enclosing.fields import mark_surface
 from tcs.model.robots.fitting.bounding import enclose
 from tcs.model.robots.fitting.growth import grown, sums_before
 from tcs.model.robots.primitives import Primitive
@@ -51,12 +51,12 @@ def _slices(box: NDArray[np.int64]) -> tuple[slice, ...]:
 
 def _cells(triangles: FloatArray) -> tuple[FloatArray, NDArray[np.bool_], float]:
     """Return the centre of the first cell, which cells are hollow, and their edge [m]."""
-    import trimesh
-
-    pitch = float(np.ptp(triangles.reshape(-1, 3), axis=0).max()) / CELLS
-    corners, index = distinct(triangles.reshape(-1, 3))
-    mesh = trimesh.Trimesh(corners, index.reshape(-1, 3), process=False)
-    voxels = mesh.voxelized(pitch)
-    shell = np.asarray(voxels.matrix)
+    corners = triangles.reshape(-1, 3)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    pitch = float((high - low).max()) / CELLS
+    first, last = (np.rint(end / pitch).astype(np.int64) for end in (low, high))
+    shell = np.zeros(last - first + 1, np.bool_)
+    # Pieces of half a cell leave no cell of a surface out.
+    mark_surface(shell, np.ascontiguousarray(triangles), pitch / 2, pitch, first)
     hollow = np.asarray(ndimage.binary_fill_holes(shell)) & ~shell
-    return np.asarray(voxels.indices_to_points(np.zeros((1, 3)))[0]), hollow, pitch
+    return first * pitch, hollow, pitch

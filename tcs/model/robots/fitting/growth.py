@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage, sparse
 
+from tcs.kernel.enclosing.growing import counts_beyond, grow_boxes
 from tcs.model.robots.fitting.bounding import hull_corners
 from tcs.model.robots.fitting.solid import Solid, distances
 
@@ -13,22 +13,31 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
-_STEPS = (8, 4, 2, 1)
-"""Cells by which a side of a box moves, in one round after the other."""
 _BORDER = 3
 """Cells around the space that a grid covers."""
-_SAMPLE = 20_000
-"""Points of a solid that give its extent along other axes."""
 _AXIS_SAMPLES = 24
 """Points of a capsule's axis at which its radius is measured."""
 _DRAWN = 8
 """Capsules drawn for each one that is kept."""
 
 
+def extremes(solid: Solid, protrusion: float) -> FloatArray:
+    """Return the corners of the hull of the points of a grid no farther from a solid, (n, 3) [m].
+
+    Args:
+        solid: The solid.
+        protrusion: Distance from it [m].
+    """
+    near = solid.outside <= protrusion
+    # Of each row, the first and the last point.
+    ends = near & ~(np.roll(near, 1, axis=2) & np.roll(near, -1, axis=2))
+    return hull_corners(solid.points(ends))
+
+
 def boxes_in(
     solid: Solid,
     protrusion: float,
-    within: FloatArray,
+    corners: FloatArray,
     R: FloatArray,
     seeds: FloatArray,
     rng: np.random.Generator,
@@ -40,7 +49,7 @@ def boxes_in(
     Args:
         solid: The solid.
         protrusion: Greatest distance of a point of a box from the solid [m].
-        within: The points of the grid that are no farther from the solid [m], shape (k, 3).
+        corners: As of `extremes`.
         R: Axes of the boxes as columns, shape (3, 3).
         seeds: Points to start from [m], shape (n, 3); those outside are left out.
         rng: Source of the orders.
@@ -48,65 +57,16 @@ def boxes_in(
     Returns:
         Least and greatest coordinates along the axes [m], shape (m, 2, 3).
     """
-    if len(within) > _SAMPLE:
-        within = within[rng.choice(len(within), _SAMPLE, replace=False)]
-    seen, border = hull_corners(within) @ R, _BORDER * solid.pitch
+    seen, border = corners @ R, _BORDER * solid.pitch
     low, high = seen.min(axis=0) - border, seen.max(axis=0) + border
     count = np.ceil((high - low) / solid.pitch).astype(np.int64) + 1
     # Sampling point k of the new grid is low @ R.T + pitch * R @ k, in cells of the solid's grid.
     start = (R @ low - solid.origin) / solid.pitch
-    free = _interpolated(solid.outside, R, start, tuple(count.tolist())) <= protrusion
+    blocked = counts_beyond(solid.outside, solid.pitch, protrusion, R, start, count)
     cells = np.clip(np.rint((seeds @ R - low) / solid.pitch).astype(np.int64), 0, count - 1)
-    cells = cells[free[tuple(cells.T)]]
-    boxes = grown(sums_before(~free), cells, rng)
+    boxes = grown(blocked, cells[_are_free(blocked, cells)], rng)
     boxes = np.unique(boxes.reshape(-1, 6), axis=0).reshape(-1, 2, 3)
     return np.asarray(low + boxes * solid.pitch)
-
-
-def _interpolated(
-    values: NDArray[np.float32], R: FloatArray, start: FloatArray, count: tuple[int, ...]
-) -> NDArray[np.float32]:
-    """Return values of a grid at the points of another one, linear between its own.
-
-    Args:
-        values: The values; beyond the grid, those of its border hold.
-        R: Axes of the other grid, of the same pitch, as columns, shape (3, 3).
-        start: Its first point, in cells of the grid, shape (3,).
-        count: Its shape.
-    """
-    still = np.flatnonzero(np.diag(R) == 1.0)
-    if not len(still):
-        found = ndimage.affine_transform(values, R, start, count, order=1, mode="nearest")
-        return np.asarray(found)
-    # Turned about an axis of the grid, all planes across it are interpolated in the same way.
-    axis = int(still[0])
-    first, second = (k for k in range(3) if k != axis)
-    low, part = _between(start[axis] + np.arange(count[axis]), values.shape[axis])
-    planes = np.moveaxis(values, axis, 2)
-    along = planes[..., low] * (1.0 - part) + planes[..., low + 1] * part
-    i, j = np.indices((count[first], count[second])).reshape(2, -1)
-    u, of_u = _between(start[first] + R[first, first] * i + R[first, second] * j, len(planes))
-    across = planes.shape[1]
-    v, of_v = _between(start[second] + R[second, first] * i + R[second, second] * j, across)
-    corner = u * across + v
-    weights = np.stack(
-        [(1 - of_u) * (1 - of_v), (1 - of_u) * of_v, of_u * (1 - of_v), of_u * of_v], axis=1
-    )
-    columns = np.stack([corner, corner + 1, corner + across, corner + across + 1], axis=1)
-    rows = np.arange(0, 4 * len(i) + 1, 4)
-    matrix = sparse.csr_array(
-        (weights.ravel(), columns.ravel(), rows), shape=(len(i), len(planes) * across)
-    )
-    turned = (matrix @ along.reshape(-1, count[axis])).astype(np.float32)
-    shape = count[first], count[second], count[axis]
-    return np.moveaxis(turned.reshape(shape), 2, axis)
-
-
-def _between(at: FloatArray, count: int) -> tuple[IntArray, FloatArray]:
-    """Return the cell before each coordinate within a row of cells, and the part of the way on."""
-    at = at.clip(0.0, count - 1.0)
-    low = at.astype(np.int64).clip(0, count - 2)
-    return low, at - low
 
 
 def sums_before(cells: BoolArray) -> NDArray[np.int32]:
@@ -129,39 +89,19 @@ def grown(counts: NDArray[np.int32], seeds: IntArray, rng: np.random.Generator) 
         seeds: Cells from which the boxes grow, shape (n, 3).
         rng: Source of the order in which the sides of each box move.
     """
-    last, rows = np.array(counts.shape) - 2, np.arange(len(seeds))
     boxes = np.stack([seeds, seeds], axis=1)
-    sides = np.argsort(rng.random((len(seeds), 6)), axis=1)
-    for step in _STEPS:
-        growing = np.ones(len(seeds), np.bool_)
-        while growing.any():
-            moved = np.zeros(len(seeds), np.bool_)
-            for turn in range(6):
-                end, axis = np.divmod(sides[:, turn], 3)
-                tried = boxes.copy()
-                tried[rows, end, axis] += np.where(end == 0, -step, step)
-                inside = (tried[:, 0] >= 0).all(axis=1) & (tried[:, 1] <= last).all(axis=1)
-                inside &= growing
-                inside[inside] = _blocked_cells(counts, tried[inside]) == 0
-                boxes[inside] = tried[inside]
-                moved |= inside
-            growing = moved
+    grow_boxes(counts, boxes, np.argsort(rng.random((len(seeds), 6)), axis=1))
     return boxes
 
 
-def _blocked_cells(counts: NDArray[np.int32], boxes: IntArray) -> IntArray:
-    """Return the number of blocked cells in boxes, from sums over all cells before each, (n,)."""
-    (a, b, c), (d, e, f) = boxes[:, 0].T, boxes[:, 1].T + 1
-    return np.asarray(
-        counts[d, e, f]
-        - counts[a, e, f]
-        - counts[d, b, f]
-        - counts[d, e, c]
-        + counts[a, b, f]
-        + counts[a, e, c]
-        + counts[d, b, c]
-        - counts[a, b, c]
-    )
+def _are_free(counts: NDArray[np.int32], cells: IntArray) -> BoolArray:
+    """Return which cells are not blocked, from sums over all cells before each, shape (n,)."""
+    i, j, k = cells.T
+    last = counts[i + 1, j + 1, k + 1] - counts[i + 1, j + 1, k]
+    last -= counts[i + 1, j, k + 1] - counts[i + 1, j, k]
+    first = counts[i, j + 1, k + 1] - counts[i, j + 1, k]
+    first -= counts[i, j, k + 1] - counts[i, j, k]
+    return np.asarray(last == first)
 
 
 def capsules_in(
@@ -178,7 +118,7 @@ def capsules_in(
     Returns:
         Ends of the axes, shapes (n, 3), and radii, shape (n,) [m]; n is at most `count`.
     """
-    depth = distances(solid.outside <= protrusion, solid.pitch)
+    depth = distances(solid.outside <= protrusion, solid.pitch, np.inf)
     cells = np.argwhere(depth > 2 * solid.pitch)
     if not len(cells):
         return np.empty((0, 3)), np.empty((0, 3)), np.empty(0)

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from tcs.kernel.enclosing.orienting import box_cost
+
 FloatArray = NDArray[np.float64]
 
 _FIRST, _LAST = 16.0, 1.0
@@ -43,16 +45,8 @@ def least_protruding(
         some = np.random.default_rng(0).choice(len(outside), _DRAWN, replace=False)
         outside, costs = outside[some], costs[some] * (len(outside) / _DRAWN)
 
-    # By coordinate: NumPy is slow along an axis of three.
-    own, apart = points.T.copy(), outside.T.copy()
-
     def cost(R: FloatArray) -> float:
-        seen, others = R.T @ own, R.T @ apart
-        low, high = seen.min(axis=1), seen.max(axis=1)
-        within = np.ones(len(outside), np.bool_)
-        for at, least, greatest in zip(others, low, high, strict=True):
-            within &= (at >= least) & (at <= greatest)
-        return float(costs[within].sum()) + per_volume * float((high - low).prod())
+        return float(box_cost(points, outside, costs, np.ascontiguousarray(R), per_volume))
 
     return least_costly(R, cost)
 

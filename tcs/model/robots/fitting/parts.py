@@ -65,7 +65,8 @@ def refit_part(
     pieces = cut(triangles, PIECE)
     own = pieces[((pieces >= low) & (pieces <= high)).all(axis=(1, 2))]
     across = float(np.ptp(own.reshape(-1, 3), axis=0).max()) / _ACROSS
-    solid = solid_within(whole, triangles, low, high, max(part.protrusion / PER_PROTRUSION, across))
+    pitch = max(part.protrusion / PER_PROTRUSION, across)
+    solid = solid_within(whole, triangles, low, high, pitch, part.protrusion)
     axes, nothing = turned(np.eye(3), range(0, 90, 15), part.axes), np.empty((0, 3))
     some = sample(own, PIECE, rng)
     grown = Candidates(body, solid, part.protrusion, axes, some, nothing, rng, part.capsules)

@@ -5,14 +5,26 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from tcs.kernel.enclosing.holding import (
+    RoundedBox,
+    contains_pieces,
+    contains_points,
+    farthest_of_pieces,
+)
 from tcs.model.robots.fitting.bounding import enclose
 from tcs.model.robots.primitives import Primitive
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-_TOUCH = 1e-6
-"""Growth of the box around a shape [m] that tells which pieces are far from it."""
+
+def rounded_box(shape: Primitive) -> RoundedBox:
+    """Return a shape as the kernel reads it."""
+    half, radius = np.array(shape.size) / 2, 0.0
+    if shape.kind != "box":
+        radius = shape.size[0]
+        half = np.array([0.0, 0.0, shape.size[1] / 2 if shape.kind == "capsule" else 0.0])
+    return RoundedBox(half=half, radius=radius, R=shape.rotation, p=np.array(shape.xyz))
 
 
 def contain(shapes: list[Primitive], pieces: FloatArray) -> BoolArray:
@@ -25,16 +37,7 @@ def contain(shapes: list[Primitive], pieces: FloatArray) -> BoolArray:
 
 def contained(shape: Primitive, pieces: FloatArray) -> BoolArray:
     """Return which pieces lie wholly in a shape, shape (n,)."""
-    low, high = shape.bounds + np.array([[-_TOUCH], [_TOUCH]])
-    is_near = np.ones(len(pieces), np.bool_)
-    # By coordinate: NumPy is slow along an axis of three.
-    for k in range(3):
-        first = pieces[:, 0, k]
-        is_near &= (first >= low[k]) & (first <= high[k])
-    near = np.flatnonzero(is_near)
-    within = np.zeros(len(pieces), np.bool_)
-    within[near] = shape.contains(pieces[near].reshape(-1, 3)).reshape(-1, 3).all(axis=1)
-    return within
+    return np.asarray(contains_pieces(rounded_box(shape), np.ascontiguousarray(pieces)))
 
 
 def reduced(
@@ -58,12 +61,14 @@ def reduced(
     """
 
     def holds(shape: Primitive) -> BoolArray:
-        return np.concatenate([contained(shape, pieces), shape.contains(inside)])
+        return np.concatenate(
+            [contained(shape, pieces), contains_points(rounded_box(shape), inside)]
+        )
 
     within = np.stack([holds(shape) for shape in shapes])
     bare = np.flatnonzero(~within[:, : len(pieces)].any(axis=0))
     if len(bare):
-        away = np.stack([shape.distance(pieces[bare]).max(axis=1) for shape in shapes])
+        away = np.stack([farthest_of_pieces(rounded_box(s), pieces[bare]) for s in shapes])
         within[away.argmin(axis=0), bare] = True
     current: dict[int, Primitive] = dict(enumerate(shapes))
     count = within.sum(axis=0)

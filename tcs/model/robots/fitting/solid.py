@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from tcs.model.robots.cutting import cut
+from tcs.kernel.enclosing.fields import FARTHEST, mark_surface, squared_distances
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -26,7 +26,8 @@ class Solid:
     """The space within the surface of a body, on a grid of points.
 
     Attributes:
-        outside: Distance of each point from the solid [m], 0 inside, shape (nx, ny, nz).
+        outside: Distance of each point from the solid [m], 0 inside, shape (nx, ny, nz). It is
+            exact up to the reach for which the solid was made, and somewhat farther.
         depth: Distance of each point from the space outside [m], 0 there, shape (nx, ny, nz).
         origin: First point of the grid in the body's frame [m], shape (3,).
         pitch: Distance of neighbouring points [m].
@@ -64,11 +65,11 @@ def solid_of(triangles: FloatArray, pitch: float, reach: float, closing: float =
     Args:
         triangles: Corners [m], shape (n, 3, 3).
         pitch: Distance of the points of the grid [m].
-        reach: Distance from the surface that the grid must cover [m].
+        reach: Distance from the surface that the grid must cover, and that is measured [m].
         closing: Radius of the ball [m].
     """
     ((empty, origin),) = spaces_outside(triangles, pitch, [(closing, reach)])
-    return measured(empty, origin, pitch)
+    return measured(empty, origin, pitch, reach)
 
 
 def spaces_outside(
@@ -84,18 +85,19 @@ def spaces_outside(
     Returns:
         For each ball, which points of its grid it touches, and the first of them [m], shape (3,).
     """
-    points = np.rint(cut(triangles, pitch).reshape(-1, 3) / pitch).astype(np.int64)
+    low, high = (
+        np.rint(f(triangles, axis=(0, 1)) / pitch).astype(np.int64) for f in (np.min, np.max)
+    )
     borders = [int(np.ceil((radius + reach) / pitch)) + _BORDER for radius, reach in balls]
-    first = points.min(axis=0) - max(borders)
-    size = points.max(axis=0) - first + max(borders) + 1
-    surface = np.zeros(size, np.bool_)
-    surface[tuple((points - first).T)] = True
-    away, spaces = distances(~surface, pitch), []
+    first = low - max(borders)
+    surface = np.zeros(high - first + max(borders) + 1, np.bool_)
+    mark_surface(surface, triangles, pitch, pitch, first)
+    away, spaces = distances(~surface, pitch, max(radius for radius, _ in balls)), []
     for (radius, _), border in zip(balls, borders, strict=True):
         parts, _ = ndimage.label(away > radius)
-        reached = distances(parts != parts[0, 0, 0], pitch) <= radius
+        reached = distances(parts != parts[0, 0, 0], pitch, radius) <= radius
         beyond = max(borders) - border
-        own = tuple(slice(beyond, count - beyond) for count in size)
+        own = tuple(slice(beyond, count - beyond) for count in surface.shape)
         spaces.append(
             ((reached & ~surface)[own].copy(), (first + beyond).astype(np.float64) * pitch)
         )
@@ -103,7 +105,12 @@ def spaces_outside(
 
 
 def solid_within(
-    whole: Solid, triangles: FloatArray, low: FloatArray, high: FloatArray, pitch: float
+    whole: Solid,
+    triangles: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    pitch: float,
+    reach: float,
 ) -> Solid:
     """Return the part of a solid between two corners, on a finer grid.
 
@@ -113,14 +120,14 @@ def solid_within(
         low: Least coordinates of the part in the frame of the triangles [m], shape (3,).
         high: Greatest coordinates [m], shape (3,).
         pitch: Distance of the points of the grid [m].
+        reach: Distance from the surface that is measured [m].
     """
     border = CLOSING + whole.pitch
     first = np.floor((low - border) / pitch)
     size = np.ceil((high + border) / pitch - first).astype(np.int64) + 1
-    points = np.round(cut(_touching(triangles, low - border, high + border), pitch) / pitch)
-    cells = (points.reshape(-1, 3) - first).astype(np.int64)
     surface = np.zeros(size, np.bool_)
-    surface[tuple(cells[((cells >= 0) & (cells < size)).all(axis=1)].T)] = True
+    near = _touching(triangles, low - border, high + border)
+    mark_surface(surface, near, pitch, pitch, first.astype(np.int64))
     axes = [
         np.round(((first[k] + np.arange(size[k])) * pitch - whole.origin[k]) / whole.pitch)
         .astype(np.int64)
@@ -128,9 +135,9 @@ def solid_within(
         for k in range(3)
     ]
     is_outside = whole.outside[np.ix_(*axes)] > 0.0
-    fits = is_outside & (distances(~surface, pitch) > CLOSING)
-    reached = distances(~fits, pitch) <= CLOSING
-    return measured(reached & ~surface, first * pitch, pitch)
+    fits = is_outside & (distances(~surface, pitch, CLOSING) > CLOSING)
+    reached = distances(~fits, pitch, CLOSING) <= CLOSING
+    return measured(reached & ~surface, first * pitch, pitch, reach)
 
 
 def _touching(triangles: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
@@ -139,29 +146,34 @@ def _touching(triangles: FloatArray, low: FloatArray, high: FloatArray) -> Float
     return np.asarray(triangles[near.all(axis=1)])
 
 
-def measured(empty: BoolArray, origin: FloatArray, pitch: float) -> Solid:
-    """Return the solid around the points of a grid that are empty."""
+def measured(empty: BoolArray, origin: FloatArray, pitch: float, reach: float) -> Solid:
+    """Return the solid around the points of a grid that are empty.
+
+    Args:
+        empty: The points outside, shape (nx, ny, nz).
+        origin: Position of the first point of the grid [m], shape (3,).
+        pitch: Distance of neighbouring points [m].
+        reach: Distance from the solid that is measured [m].
+    """
     return Solid(
-        outside=distances(empty, pitch).astype(np.float32),
-        depth=distances(~empty, pitch).astype(np.float32),
+        outside=distances(empty, pitch, reach).astype(np.float32),
+        depth=distances(~empty, pitch, np.inf).astype(np.float32),
         origin=origin,
         pitch=pitch,
     )
 
 
-def distances(cells: BoolArray, pitch: float) -> FloatArray:
+def distances(cells: BoolArray, pitch: float, reach: float) -> FloatArray:
     """Return the distance of each cell that is set from the nearest that is not [m], 0 elsewhere.
-
-    As `ndimage.distance_transform_edt`, whose sum of squares takes as long as its search.
 
     Args:
         cells: The cells, some of which are not set, shape (nx, ny, nz).
         pitch: Distance of neighbouring cells [m].
+        reach: Distance that is of interest [m]: greater ones may be too small, but exceed it by
+            more than the diagonal of a cell.
     """
-    nearest = ndimage.distance_transform_edt(cells, return_distances=False, return_indices=True)
-    squares, others = np.zeros(cells.shape, np.int32), ((1, 2), (0, 2), (0, 1))
-    for k, found in enumerate(nearest):
-        found -= np.expand_dims(np.arange(cells.shape[k], dtype=np.int32), others[k])
-        found *= found
-        squares += found
-    return np.sqrt(squares, dtype=np.float64) * pitch
+    # A cell and its neighbours are no farther apart than two edges.
+    most = FARTHEST if np.isinf(reach) else int(np.ceil(reach / pitch)) + 2
+    squares = squared_distances(np.ascontiguousarray(cells), most)
+    length = np.sqrt(np.arange(int(squares.max(initial=0)) + 1)) * pitch
+    return np.asarray(length[squares])

@@ -7,15 +7,18 @@ from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import delayed
 from numpy.typing import NDArray
 
 from tcs.errors import UnknownNameError
+from tcs.kernel.enclosing.holding import set_cells_within
 from tcs.model.robots.fitting.bounding import enclose
 from tcs.model.robots.fitting.candidates import thinned
 from tcs.model.robots.fitting.enclosure import surfaces_to_enclose
 from tcs.model.robots.fitting.filling import fillers
 from tcs.model.robots.fitting.orienting import least_protruding
+from tcs.model.robots.fitting.processes import ordered
+from tcs.model.robots.fitting.reduction import rounded_box
 from tcs.model.robots.fitting.shared_surface import (
     BoolArray,
     FloatArray,
@@ -94,14 +97,16 @@ def tightened(
     found: dict[str, tuple[Primitive, ...]] = {}
     for shape in shapes:
         found[shape.body] = (*found.get(shape.body, ()), shape)
-    surfaces, tasks = surfaces_to_enclose(robot), []
+    surfaces, tasks = surfaces_to_enclose(robot), {}
     for body, most in splits.items():
         if body not in found or body not in surfaces:
             raise UnknownNameError("body", body, found, where=f"primitives '{robot.primitives}'")
         given = (*found[body], *rounds.get(body, ()))
-        tasks.append((body, given, surfaces[body][2], spots.get(body, ()), most))
-    tight = Parallel(jobs)(delayed(_tightened_body)(*task) for task in tasks)
-    found |= dict(zip(splits, tight, strict=True))
+        tasks[body] = body, given, surfaces[body][2], spots.get(body, ()), most
+    # The longest first: the one that is left at the end should be short.
+    order = sorted(tasks, key=lambda body: -len(tasks[body][1]) * len(tasks[body][2]))
+    tight = ordered(jobs, (delayed(_tightened_body)(*tasks[body]) for body in order))
+    found |= dict(zip(order, tight, strict=True))
     return tuple(shape for fitted in found.values() for shape in fitted)
 
 
@@ -143,6 +148,7 @@ class Tightening(SharedSurface):
         volume = float(np.ptp(triangles, axis=(0, 1)).prod())
         pitch = max(FINEST_PITCH, float(np.cbrt(volume / (SPOT_CELLS if spots else CELLS))))
         self._solid, inside = space_of(triangles, pitch, _overhang(shapes, triangles))
+        self._is_outside = self._solid.outside > 0.0
         self._worth = _worth(self._solid, spots)
         longest = max(PIECE, 2 * pitch)
         super().__init__(body, shapes, (triangles, inside), longest, self._solid.outside.size)
@@ -246,9 +252,9 @@ class Tightening(SharedSurface):
     def _held_by(self, shape: Primitive) -> IntArray:
         solid = self._solid
         around, first = solid.between(*shape.bounds)
-        cells = np.argwhere(solid.outside[around] > 0.0) + first
-        cells = cells[shape.contains(cells * solid.pitch + solid.origin)]
-        return np.asarray(np.ravel_multi_index(tuple(cells.T), solid.outside.shape))
+        ends = np.stack([first, [part.stop - 1 for part in around]])
+        held = rounded_box(shape)
+        return set_cells_within(held, self._is_outside, ends, solid.origin, solid.pitch)
 
 
 def space_of(triangles: FloatArray, pitch: float, reach: float) -> tuple[Solid, FloatArray]:
@@ -263,7 +269,8 @@ def space_of(triangles: FloatArray, pitch: float, reach: float) -> tuple[Solid, 
     closing = max(CLOSING, _CLOSING_CELLS * pitch)
     balls = (closing, reach), (max(USUAL_CLOSING, extent / SPACINGS), 0.0)
     solid, wide = (
-        measured(empty, origin, pitch) for empty, origin in spaces_outside(triangles, pitch, balls)
+        measured(empty, origin, pitch, 0.0)
+        for empty, origin in spaces_outside(triangles, pitch, balls)
     )
     # The inside of a cover with openings that only the smaller ball enters.
     deep = wide.points(wide.depth > DEEP)

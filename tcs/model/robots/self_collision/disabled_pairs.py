@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from joblib import delayed
 from numpy.typing import NDArray
 
 from tcs.model.robots.extras import model_with_extras
+from tcs.model.robots.fitting.processes import ordered
 from tcs.model.robots.robot_file import DisabledGroup, RobotFile
 from tcs.model.robots.self_collision.clearance import (
     CLEAR,
@@ -23,6 +26,7 @@ from tcs.model.robots.self_collision.clearance import (
 )
 from tcs.model.robots.self_collision.plant import BodyPair, SelfCollision
 from tcs.model.robots.self_collision.postures import sample_positions
+from tcs.model.robots.urdf import Urdf
 
 FloatArray = NDArray[np.float64]
 
@@ -34,7 +38,7 @@ _MOST_JOINTS = 3
 
 
 def propose_disabled_pairs(
-    robot: RobotFile, *, postures: int = 2000, seed: int = 0
+    robot: RobotFile, *, postures: int = 2000, seed: int = 0, jobs: int = 1
 ) -> tuple[DisabledGroup, ...]:
     """Return the pairs of bodies that need no check, grouped by reason.
 
@@ -53,6 +57,7 @@ def propose_disabled_pairs(
         robot: The robot; its present disabled pairs are ignored, and so are their ranges.
         postures: Postures drawn uniformly within the hard limits.
         seed: Seed of the draws.
+        jobs: Number of processes; does not change the result.
 
     Raises:
         RobotError: If the robot's model cannot be used.
@@ -62,16 +67,14 @@ def propose_disabled_pairs(
     model = model_with_extras(robot)
     moved, hand = (model.links_moved_by(robot.arm_joints[i]) for i in (0, -1))
     neighbours = neighbouring_pairs(robot)
-    touched, always = touching_pairs(
-        robot, moved, neighbours, sample_positions(hard, postures, seed), _distant_pairs(robot)
+    touched, always = _touching_pairs(
+        robot, moved, neighbours, sample_positions(hard, postures, seed), jobs
     )
     triangles = carried_triangles(robot, model)
-    surfaces = SurfaceDistance(model, triangles)
-    fine = SurfaceDistance(model, triangles, scale=FINER, rough=surfaces)
     hard_limits, soft_limits = hard.joint_limits(), soft.joint_limits()
-    found = _Found()
+    found, tasks = _Found(), {}
     for pair in sorted(touched):
-        if not all(surfaces.has(body) for body in pair):
+        if not all(body in triangles for body in pair):
             continue
         if pair in neighbours:
             found.neighbours.append(pair)
@@ -80,18 +83,13 @@ def propose_disabled_pairs(
             # Scoring does not check pairs within the hand.
             continue
         between = free_joints(model, joints_between(model, *pair))
-        few = len(between) <= _MOST_JOINTS
-        tried = [(hard, found.apart_hard), (soft, found.apart_soft)]
-        if all(hard_limits[name] == soft_limits[name] for name in between):
-            tried.pop()
-        for limits, apart in tried:
-            gap = _closest_approach((surfaces, fine), pair, limits, seed) if few else 0.0
-            if gap >= MEETING:
-                apart[pair] = gap
-                break
-        else:
-            if pair in always:
-                found.always.append(pair)
+        if len(between) > _MOST_JOINTS:
+            found.add(pair, None, pair in always)
+            continue
+        is_alike = all(hard_limits[name] == soft_limits[name] for name in between)
+        tasks[pair] = (hard,) if is_alike else (hard, soft)
+    for pair, gap in _gaps(model, triangles, tasks, seed, jobs).items():
+        found.add(pair, gap, pair in always)
     return found.groups(postures)
 
 
@@ -155,6 +153,32 @@ def touching_pairs(
     return touched, always or set()
 
 
+def _touching_pairs(
+    robot: RobotFile,
+    moved: frozenset[str],
+    neighbours: set[BodyPair],
+    postures: Sequence[dict[str, float]],
+    jobs: int,
+) -> tuple[set[BodyPair], set[BodyPair]]:
+    """Return what `touching_pairs` does of the pairs that matter, its postures shared by processes.
+
+    Args:
+        robot: The robot.
+        moved: The bodies that the scored arm moves.
+        neighbours: Pairs that are left out of those that touch in all postures.
+        postures: Positions by joint [rad or m].
+        jobs: Number of processes.
+    """
+    distant = _distant_pairs(robot)
+    parts = [list(postures[k::jobs]) for k in range(min(jobs, len(postures)))]
+    found = ordered(
+        jobs,
+        (delayed(touching_pairs)(robot, moved, neighbours, part, distant) for part in parts),
+    )
+    touched, always = zip(*found, strict=True)
+    return set().union(*touched), set.intersection(*always)
+
+
 def renewed_groups(robot: RobotFile) -> tuple[DisabledGroup, ...]:
     """Return the proposed groups of a robot, after those of its file that were made by hand.
 
@@ -176,20 +200,59 @@ def renewed_groups(robot: RobotFile) -> tuple[DisabledGroup, ...]:
     return (*kept, *(group for group in proposed if group.pairs))
 
 
-def _closest_approach(
-    surfaces: tuple[SurfaceDistance, SurfaceDistance], pair: BodyPair, robot: RobotFile, seed: int
-) -> float:
-    """Return the least distance of two surfaces within the limits in force [m].
+_Gap = tuple[str, float]
+"""Limits within which two surfaces stay apart, "hard" or "soft", and their least distance [m]."""
+
+
+def _gaps(
+    model: Urdf,
+    triangles: Mapping[str, FloatArray],
+    tasks: Mapping[BodyPair, tuple[RobotFile, ...]],
+    seed: int,
+    jobs: int,
+) -> dict[BodyPair, _Gap | None]:
+    """Return the gaps of pairs, in their order; None if two surfaces may meet.
 
     Args:
-        surfaces: The surfaces at the usual scale, and finer for parts that pass each other closely.
-        pair: Names of the bodies.
-        robot: The robot, with its limits in force.
+        model: The robot.
+        triangles: Surface of each body in its frame [m], shapes (n, 3, 3).
+        tasks: The robot with the limits to try one after the other, by pair.
         seed: Seed of the draws.
+        jobs: Number of processes.
     """
-    usual, fine = surfaces
-    gap = usual.closest_approach(pair, robot, seed)
-    return fine.closest_approach(pair, robot, seed) if MEETING <= gap < CLEAR else gap
+    # The largest surfaces, which take longest, are shared out first.
+    by_size = sorted(tasks, key=lambda pair: sorted(-len(triangles[body]) for body in pair))
+    shares = [{pair: tasks[pair] for pair in by_size[k::jobs]} for k in range(jobs)]
+    calls = (
+        delayed(_gaps_of)(model, {b: triangles[b] for pair in share for b in pair}, share, seed)
+        for share in shares
+        if share
+    )
+    found = ordered(jobs, calls)
+    gaps = {pair: gap for share in found for pair, gap in share.items()}
+    return {pair: gaps[pair] for pair in tasks}
+
+
+def _gaps_of(
+    model: Urdf,
+    triangles: Mapping[str, FloatArray],
+    tasks: Mapping[BodyPair, tuple[RobotFile, ...]],
+    seed: int,
+) -> dict[BodyPair, _Gap | None]:
+    """Return the gaps of pairs, one after the other."""
+    usual = SurfaceDistance(model, triangles)
+    fine = SurfaceDistance(model, triangles, scale=FINER, rough=usual)
+    gaps: dict[BodyPair, _Gap | None] = dict.fromkeys(tasks)
+    for pair, tried in tasks.items():
+        for limits, robot in zip(("hard", "soft"), tried, strict=False):
+            gap = usual.closest_approach(pair, robot, seed)
+            if MEETING <= gap < CLEAR:
+                # Parts that pass each other closely.
+                gap = fine.closest_approach(pair, robot, seed)
+            if gap >= MEETING:
+                gaps[pair] = limits, gap
+                break
+    return gaps
 
 
 @dataclass
@@ -200,6 +263,20 @@ class _Found:
     apart_hard: dict[BodyPair, float] = field(default_factory=dict)
     apart_soft: dict[BodyPair, float] = field(default_factory=dict)
     always: list[BodyPair] = field(default_factory=list)
+
+    def add(self, pair: BodyPair, gap: _Gap | None, is_always: bool) -> None:
+        """Add a pair that is no pair of neighbours, if it needs no check.
+
+        Args:
+            pair: Names of the bodies.
+            gap: Its gap, if there is any.
+            is_always: Whether its primitives touch in every posture.
+        """
+        if gap is not None:
+            limits, away = gap
+            (self.apart_hard if limits == "hard" else self.apart_soft)[pair] = away
+        elif is_always:
+            self.always.append(pair)
 
     def groups(self, postures: int) -> tuple[DisabledGroup, ...]:
         """Return the groups that are not empty."""

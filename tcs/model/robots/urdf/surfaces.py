@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from tcs.errors import RobotError
 from tcs.files.quantities import SIZE
+from tcs.files.unchanged import kept_while_unchanged
 from tcs.model.robots.cutting import distinct
 from tcs.model.robots.urdf.meshes import mesh_triangles
 from tcs.model.robots.urdf.model import Geometry, Urdf, Vector
@@ -43,15 +45,23 @@ def body_triangles(model: Urdf) -> dict[str, FloatArray]:
     for body in model.links:
         geometries = surface_geometries(model, body)
         if geometries:
-            found[body] = _placed_triangles(geometries)
+            meshes = tuple(g.mesh for g in geometries if g.mesh is not None)
+            found[body] = _placed_triangles(meshes, geometries)
     return found
 
 
-def _placed_triangles(geometries: tuple[Geometry, ...]) -> FloatArray:
-    """Return the triangles of the geometries of a body in its frame [m], shape (n, 3, 3)."""
+@kept_while_unchanged(files=64)
+def _placed_triangles(meshes: tuple[Path, ...], geometries: tuple[Geometry, ...]) -> FloatArray:
+    """Return the triangles of the geometries of a body in its frame [m], shape (n, 3, 3).
+
+    Args:
+        meshes: The files of those that are meshes.
+        geometries: The geometries.
+    """
     pieces = [place(geometry_triangles(g), g.xyz, g.rpy) for g in geometries]
     # One mesh often is both visual and collision geometry.
     corners, _ = distinct(np.concatenate(pieces).reshape(-1, 9))
+    corners.setflags(write=False)
     return corners.reshape(-1, 3, 3)
 
 

@@ -1,40 +1,41 @@
-"""Grids of distances: interpolated along other axes, and measured, as SciPy does it."""
+"""Grids of distances, measured as SciPy does it, and the space that they describe."""
 
 import numpy as np
 import pytest
 from scipy import ndimage
 from scipy.spatial.transform import Rotation
 
-from tcs.model.robots.fitting.growth import _interpolated
+from tcs.model.robots.fitting.growth import extremes
 from tcs.model.robots.fitting.solid import distances, solid_of, spaces_outside
 
 PITCH = 0.002
 
 
-@pytest.fixture
-def cells(rng):
-    found = rng.random((19, 23, 17)) < 0.999
-    found[5:11, 4:9, 3:14] = False
-    return found
-
-
-@pytest.mark.parametrize("axis", ["x", "y", "z", "xyz"])
-@pytest.mark.parametrize("angle", [0, 15, 75])
-def test_values_along_turned_axes_are_those_of_scipy(cells, axis, angle, rng):
-    values = (distances(cells, PITCH) + rng.random(cells.shape)).astype(np.float32)
-    R = Rotation.from_euler(axis, [angle] * len(axis), degrees=True).as_matrix()
-    # From outside the grid to outside it.
-    start, count = rng.uniform(-9.0, 3.0, 3), (31, 28, 40)
-    found = _interpolated(values, R, start, count)
-    expected = ndimage.affine_transform(values, R, start, count, order=1, mode="nearest")
-    assert found.dtype == np.float32
-    # A last digit of single precision: sums are in another order.
-    np.testing.assert_allclose(found, expected, rtol=3e-7)
-
-
-def test_distances_are_those_of_scipy(cells):
+@pytest.mark.parametrize("reach", [0.003, np.inf])
+def test_distances_are_those_of_scipy(reach, rng):
+    cells = rng.random((19, 23, 17)) < 0.999
+    cells[5:11, 4:9, 3:14] = False
     expected = ndimage.distance_transform_edt(cells) * PITCH
-    np.testing.assert_array_equal(distances(cells, PITCH), expected)
+    found = distances(cells, PITCH, reach)
+    # Up to two edges of a cell farther, and never nearer than that.
+    exact = expected <= reach + 2 * PITCH
+    assert exact.any()
+    assert exact.all() == np.isinf(reach)
+    np.testing.assert_array_equal(found[exact], expected[exact])
+    assert (found[~exact] > reach + 2 * PITCH).all()
+
+
+def test_the_extremes_of_a_solid_span_all_of_it():
+    u, v = np.meshgrid(np.linspace(0, np.pi, 40), np.linspace(0, 2 * np.pi, 60), indexing="ij")
+    at = 0.04 * np.stack([np.sin(u) * np.cos(v), 0.7 * np.sin(u) * np.sin(v), np.cos(u)], axis=2)
+    corners = [at[:-1, :-1], at[1:, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1], at[:-1, 1:]]
+    solid = solid_of(np.stack(corners, axis=2).reshape(-1, 3, 3), PITCH, 0.005)
+    within = solid.points(solid.outside <= 0.005)
+    found = extremes(solid, 0.005)
+    assert len(found) < len(within) / 50
+    for R in Rotation.random(5, rng=np.random.default_rng(0)).as_matrix():
+        for f in (np.min, np.max):
+            np.testing.assert_allclose(f(found @ R, axis=0), f(within @ R, axis=0), atol=1e-12)
 
 
 def test_a_space_does_not_depend_on_the_other_balls():

@@ -85,7 +85,7 @@ def test_a_tilted_bar_gets_a_tilted_box():
 
 def test_rotated_boxes_protrude_less(steps, monkeypatch):
     """Drums that no box along the axes follows, with and without the rotation of boxes."""
-    R = Rotation.from_euler("xyz", (10, 20, 30), degrees=True).as_matrix()
+    R = Rotation.from_euler("xyz", (30, 30, 30), degrees=True).as_matrix()
     tilted = steps @ R.T
     box = enclose("b", corner_points(tilted), "box", np.eye(3))
     excess = []
