@@ -94,3 +94,24 @@ def test_the_oldest_answer_goes_first(tmp_path, read, readings):
     for path in (first, second, third, third, first):
         assert read(path, "utf-8") == path.name
     assert readings == [first, second, third, first]
+
+
+def test_what_several_files_say_is_kept_until_one_of_them_changes(tmp_path):
+    readings = []
+
+    @kept_while_unchanged(files=2)
+    def both(paths: tuple[Path, ...], end: str) -> str:
+        readings.append(paths)
+        return "".join(path.read_text() for path in paths) + end
+
+    first, second = old_file(tmp_path / "a", "one"), old_file(tmp_path / "b", "two")
+    assert [both((first, second), "."), both((first, second), ".")] == ["onetwo."] * 2
+    assert len(readings) == 1
+    assert both((first, second), "!") == "onetwo!"
+    old_file(second, "six")
+    assert both((first, second), ".") == "onesix."
+    # Of a file that is not there, nothing is kept.
+    second.unlink()
+    with pytest.raises(FileNotFoundError):
+        both((first, second), ".")
+    assert both((), ".") == "."

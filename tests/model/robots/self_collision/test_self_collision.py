@@ -1,5 +1,7 @@
 """Self-collision: checked pairs detect real contact, and the others need no check."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -219,6 +221,18 @@ def test_bodies_welded_to_the_base_are_checked_with_it(tmp_path):
     off = {frozenset(pair) for pair in draft.robot.disabled_pairs}
     assert frozenset(("base", "arm2")) not in off
     assert frozenset(("arm1", "arm2")) in off
+
+
+def test_processes_find_the_pairs_that_one_finds(tmp_path):
+    (tmp_path / "made_up.urdf").write_text(urdf())
+    draft = draft_robot(tmp_path / "made_up.urdf", "tool")
+    # Shapes so fat that some touch although the surfaces stay apart.
+    fat = tuple(shape.shrunk(-0.05) for shape in draft.primitives)
+    write_draft(replace(draft, primitives=fat), tmp_path / "mine.yaml")
+    robot = load_robot(tmp_path / "mine.yaml")
+    alone = propose_disabled_pairs(robot, postures=60)
+    assert [group.reason.split(":")[0] for group in alone] == ["neighbours", "cannot meet"]
+    assert propose_disabled_pairs(robot, postures=60, jobs=2) == alone
 
 
 @pytest.mark.slow
