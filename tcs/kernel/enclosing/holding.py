@@ -142,7 +142,7 @@ def chosen_covers(
 
     Args:
         covered: What each candidate covers, shape (candidates, items).
-        order: The candidates in an order in which the first of those that cover as much is taken.
+        order: Those to choose from; of several that cover as much, the first is taken.
         weights: Weights of the items, shape (items,).
         needed: Number of the first items that are to be covered.
         most: Greatest number of candidates.
@@ -150,8 +150,8 @@ def chosen_covers(
     """
     left = np.ones(len(weights), np.bool_)
     # What each covered alone when it was looked at last: no less than what it covers alone now.
-    gains = np.empty(len(covered), np.int64)
-    for n in range(len(covered)):
+    gains = np.empty(len(order), np.int64)
+    for n in range(len(order)):
         gains[n] = _gain(covered[order[n]], weights, left)
     chosen = np.empty(most, np.int64)
     count, bare = 0, needed

@@ -26,6 +26,8 @@ _CHOOSING = 4_000
 """Most pieces by which the shapes are chosen; all are enclosed in the end."""
 _COVERED = 0.99
 """Fraction of those pieces at which no further shape is added: the nearest one grows."""
+_PART = 0.7
+"""Fraction of the candidates from which a further draw chooses."""
 _ROUNDS = 4
 """Rounds of shapes that grow from what those before leave bare."""
 _PIECE_WEIGHT = 20
@@ -70,12 +72,17 @@ class Candidates:
         ]
         self._order = np.argsort(np.concatenate(volumes), kind="stable")
 
-    def chosen(self, most: int) -> list[Primitive]:
-        """Return the shapes that cover most, each what those before it leave, or the smallest."""
-        left_out = int((1 - _COVERED) * self._pieces)
-        best = chosen_covers(
-            self._covered, self._order, self._weights, self._pieces, most, left_out
-        )
+    def chosen(self, most: int, draw: int = 0) -> list[Primitive]:
+        """Return the shapes that cover most, each what those before it leave, or the smallest.
+
+        Args:
+            most: Largest number of shapes.
+            draw: 0 for all candidates; others choose from a part of them, each from its own.
+        """
+        left_out, order = int((1 - _COVERED) * self._pieces), self._order
+        if draw:
+            order = order[np.random.default_rng(draw).random(len(order)) < _PART]
+        best = chosen_covers(self._covered, order, self._weights, self._pieces, most, left_out)
         return [self._shape(index) for index in best.tolist()]
 
     def _shape(self, index: int) -> Primitive:

@@ -45,6 +45,8 @@ DEEP = 0.012
 """Depth [m] from which on the inside has to be covered too, and least spacing of points there."""
 SPACINGS = 20
 """Most points inside along a body."""
+_DRAWS = 3
+"""Choices of shapes, of which the one of the least volume is taken: it varies by some per cent."""
 _SLACK = 0.25
 """Mean protrusion of a single shape, as a fraction of the greatest allowed, that needs no more."""
 
@@ -131,8 +133,12 @@ def _covering(
     inside = thinned(inside, max(DEEP, size / SPACINGS))
     some, tried = sample(pieces, max(PIECE, 2 * pitch), rng), orientations(tight)
     candidates = Candidates(body, solid, target.protrusion, tried, some, inside, rng)
-    shapes = candidates.chosen(target.max_shapes)
-    if target.patches:
-        bare = pieces[~contain(shapes, pieces)]
-        shapes += patches(body, solid, target.protrusion, target.patches, tried, bare, rng)
-    return reduced(body, shapes, pieces, inside) if shapes else []
+    found = []
+    for draw in range(_DRAWS):
+        shapes = candidates.chosen(target.max_shapes, draw)
+        if target.patches:
+            bare = pieces[~contain(shapes, pieces)]
+            shapes += patches(body, solid, target.protrusion, target.patches, tried, bare, rng)
+        if shapes:
+            found.append(reduced(body, shapes, pieces, inside))
+    return min(found, key=union_volume, default=[])

@@ -17,6 +17,9 @@ from tcs.model.robots.primitives import Primitive
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
+_TOUCH = 1e-6
+"""Growth of the box around a shape [m] that tells which pieces are far from it."""
+
 
 def rounded_box(shape: Primitive) -> RoundedBox:
     """Return a shape as the kernel reads it."""
@@ -40,6 +43,31 @@ def contained(shape: Primitive, pieces: FloatArray) -> BoolArray:
     return np.asarray(contains_pieces(rounded_box(shape), np.ascontiguousarray(pieces)))
 
 
+class SortedPieces:
+    """Pieces of a surface by their place along it: of most shapes, only a part of them is near."""
+
+    def __init__(self, pieces: FloatArray) -> None:
+        """Sort pieces.
+
+        Args:
+            pieces: Corners of the pieces [m], shape (n, 3, 3).
+        """
+        first = pieces[:, 0]
+        self._axis = int(np.argmax(np.ptp(first, axis=0))) if len(first) else 0
+        order = np.argsort(first[:, self._axis], kind="stable")
+        self.corners: FloatArray = pieces[order]
+        """Corners of the pieces in their order [m], shape (n, 3, 3)."""
+        self._places = first[order, self._axis]
+
+    def within(self, shape: Primitive) -> BoolArray:
+        """Return which pieces lie wholly in a shape, shape (n,)."""
+        ends = shape.bounds[:, self._axis] + np.array([-_TOUCH, _TOUCH])
+        near = slice(*np.searchsorted(self._places, ends).tolist())
+        found = np.zeros(len(self.corners), np.bool_)
+        found[near] = contained(shape, self.corners[near])
+        return found
+
+
 def reduced(
     body: str,
     shapes: list[Primitive],
@@ -59,11 +87,11 @@ def reduced(
         inside: Points inside to be contained [m], shape (m, 3).
         boxed: Whether a box may take the place of a capsule that contains little alone.
     """
+    placed = SortedPieces(pieces)
+    pieces = placed.corners
 
     def holds(shape: Primitive) -> BoolArray:
-        return np.concatenate(
-            [contained(shape, pieces), contains_points(rounded_box(shape), inside)]
-        )
+        return np.concatenate([placed.within(shape), contains_points(rounded_box(shape), inside)])
 
     within = np.stack([holds(shape) for shape in shapes])
     bare = np.flatnonzero(~within[:, : len(pieces)].any(axis=0))
@@ -71,7 +99,7 @@ def reduced(
         away = np.stack([farthest_of_pieces(rounded_box(s), pieces[bare]) for s in shapes])
         within[away.argmin(axis=0), bare] = True
     current: dict[int, Primitive] = dict(enumerate(shapes))
-    count = within.sum(axis=0)
+    count = within.sum(axis=0, dtype=np.int16)
     # The smallest first, so that they are dropped rather than large ones reduced.
     for k in sorted(current, key=lambda k: shapes[k].volume):
         alone = within[k] & (count == 1)

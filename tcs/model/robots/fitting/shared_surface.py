@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import RobotError
+from tcs.kernel.enclosing.holding import contains_points
 from tcs.model.robots.cutting import cut, distinct, halved, longest_edges
 from tcs.model.robots.fitting.bounding import (
     enclose,
@@ -18,7 +19,7 @@ from tcs.model.robots.fitting.bounding import (
     hull_corners,
     tightest_orientation,
 )
-from tcs.model.robots.fitting.reduction import contain, contained
+from tcs.model.robots.fitting.reduction import SortedPieces, contain, rounded_box
 from tcs.model.robots.primitives import FINEST, Primitive
 
 FloatArray = NDArray[np.float64]
@@ -59,7 +60,8 @@ class SharedSurface(ABC):
         """
         triangles, inside = surface
         self._body, self._shapes = body, list(shapes)
-        self._pieces = _pieces_in(self._shapes, triangles, longest)
+        self._placed = SortedPieces(_pieces_in(self._shapes, triangles, longest))
+        self._pieces = self._placed.corners
         points, index = distinct(self._pieces.reshape(-1, 3))
         self._corners, self._index = points, index.reshape(-1, 3)
         self._inside = inside[np.any([s.contains(inside) for s in self._shapes], axis=0)]
@@ -200,7 +202,8 @@ class SharedSurface(ABC):
         return self._cost(numbers[self._held[numbers] == 1])
 
     def _contained(self, shape: Primitive) -> BoolArray:
-        return np.concatenate([contained(shape, self._pieces), shape.contains(self._inside)])
+        inside = contains_points(rounded_box(shape), self._inside)
+        return np.concatenate([self._placed.within(shape), inside])
 
 
 def around(body: str, shape: Primitive, points: FloatArray) -> list[Primitive]:
