@@ -82,7 +82,12 @@ def _without_world(model: Urdf) -> Urdf:
 
 
 def _check_tree(model: Urdf) -> None:
-    """Raise an error if joints name unknown links, do not form one tree, or carry the world."""
+    """Raise an error without links, or if joints name others, form no tree or carry the world."""
+    if not model.links:
+        raise RobotError(
+            f"URDF '{model.path}': it has no link, so it describes no robot. If the package has "
+            "another URDF of it, name that one."
+        )
     if WORLD in model.links:
         raise RobotError(
             f"URDF '{model.path}': a link is named '{WORLD}', which stands for the environment. "

@@ -43,6 +43,13 @@ def test_without_safety_controller_hard_limits_hold(tmp_path):
     assert joint.soft == joint.hard == (-1.0, 2.0)
 
 
+def test_a_file_without_links_describes_no_robot(tmp_path):
+    file = tmp_path / "empty.urdf"
+    file.write_text('<robot name="empty"><!-- No macro was called. --></robot>')
+    with pytest.raises(RobotError, match="it has no link, so it describes no robot"):
+        read_urdf(file)
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
