@@ -1,13 +1,13 @@
 """Draft a robot file from every URDF of example-robot-data that has an arm, and score with it.
 
-Usage: python benchmarks/drafting.py [--robots ur10,z1] [--all] [--coarse] [--jobs 2] [--limit 900]
+Usage: python benchmarks/drafting.py [--robots ur10,b1] [--all] [--coarse] [--jobs 2] [--limit 900]
                                       [--missing]
 
 Each robot is drafted by `tcs robot new`, checked by `tcs robot check` and scored at goals around
 its reach, each in a process of its own that ends at the limit [s of processor] and may use 8 GB.
 What is not supported ends in one line of the command. With `--all`, every URDF of the package is
-drafted, also of what has no arm, with the tool named here or else its deepest link, and counted.
-`--missing` continues a run that was interrupted.
+drafted, also of what has no arm, with the tool named here or else its deepest link, and counted;
+`--robots` takes any of them. `--missing` continues a run that was interrupted.
 """
 
 from __future__ import annotations
@@ -129,10 +129,10 @@ def main() -> int:
     options = parse()
     header()
     rows = []
-    robots = (
-        everything() if options.all else {name: ROBOTS[name] for name in options.robots.split(",")}
-    )
-    table = ("all" if options.all else "robots") + ("_coarse" if options.coarse else "")
+    robots = everything()
+    if not options.all:
+        robots = {name: robots[name] for name in options.robots.split(",")}
+    table = "all_coarse" if options.coarse else "all"
     done = saved_rows(table) if options.missing else ()
     for name, (urdf, tool) in robots.items():
         if name in done:
@@ -154,13 +154,14 @@ def saved_rows(table: str) -> set[str]:
 
 def everything() -> dict[str, tuple[str, str]]:
     """Return the path of every URDF of the package and its tool link, by a name of its own."""
-    known = {urdf: (name, tool) for name, (urdf, tool) in ROBOTS.items()}
+    names = {urdf: name for name, (urdf, _) in ROBOTS.items()}
     root, found = data_folder(), {}
     for path in sorted(root.rglob("*.urdf")):
         urdf = str(path.relative_to(root))
-        name, tool = known.get(urdf, (path.stem, FURTHER_TOOLS.get(path.stem, "")))
-        if name in found:
+        name = names.get(urdf, path.stem)
+        if urdf not in names and (name in ROBOTS or name in found):
             name = f"{urdf.split('_description')[0]}_{name}"
+        _, tool = ROBOTS.get(name, ("", FURTHER_TOOLS.get(path.stem, "")))
         found[name] = urdf, tool or deepest(path)
     return found
 

@@ -38,7 +38,7 @@ def test_the_corners_of_pieces_are_marked(rng):
     triangles = rng.uniform(-0.1, 0.1, (40, 3, 3))
     # A triangle without area too.
     triangles[0] = triangles[0, :1]
-    pitch = 0.004
+    pitch = 0.02
     corners = np.rint(cut(triangles, pitch).reshape(-1, 3) / pitch).astype(int)
     first = corners.min(axis=0)
     expected = np.zeros(np.ptp(corners, axis=0) + 1, np.bool_)
