@@ -23,7 +23,7 @@ PROTRUSION = 0.01
 """Distance by which the shapes around a mesh may protrude unless the file says otherwise [m]."""
 MOST_SHAPES = 100
 """Largest number of shapes around a mesh; if they do not suffice, some protrude farther."""
-_VERSION = "1"
+_VERSION = "2"
 """Part of the cache key: increase it when the fit changes."""
 _DECIMALS = 7
 """Corners that agree to so many decimals are one: exporters write each triangle by itself."""
