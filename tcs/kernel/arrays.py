@@ -75,7 +75,7 @@ class BodyDistances(NamedTuple):
     """Tables of lower bounds of the distance of two bodies of the robot.
 
     The cells of a table divide a full turn of two joints, from 0 on. The distance decreases by at
-    most the reach of a joint times its motion from the centre of a cell.
+    most the reach of a joint times its motion.
     """
 
     body: IntArray
@@ -86,9 +86,9 @@ class BodyDistances(NamedTuple):
     """Number of cells of a full turn of either joint, shape (n, 2)."""
     reach: FloatArray
     """Reach of either joint [m/rad], shape (n, 2)."""
-    cells: NDArray[np.uint8]
-    """Distances at the centres of the cells, in steps of 0.2 mm, rounded down; row by row, table by
-    table."""
+    corners: NDArray[np.uint8]
+    """Distances at the corners of the cells, in steps of 0.04 mm, rounded down; row by row, table
+    by table."""
 
 
 NO_DISTANCES = BodyDistances(

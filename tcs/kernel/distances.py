@@ -12,13 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.kernel.arrays import BodyDistances, FloatArray, IntArray
-from tcs.kernel.cache import inner
+from tcs.kernel.cache import inner, int_constant
 
-UNIT = 2e-4
-"""Distance that one step of a cell stands for [m]."""
+UNIT = 4e-5
+"""Distance that one step of a corner stands for [m]."""
+FARTHEST = 255 * UNIT
+"""The farthest that a corner can hold [m]."""
+NOTHING = -1.0
+"""Bound where none is known [m]."""
+FIRST, SECOND = int_constant(0), int_constant(1)
+"""Joints of a table."""
 FULL_TURN = 2.0 * np.pi
-MOST_CELLS = 64
-"""Most cells that are read to see whether a pair is in contact all over a range of its joints."""
+MOST_CORNERS = 64
+"""Most corners that are read to see whether a pair is in contact all over a range of its joints."""
 
 
 class DistanceTables(NamedTuple):
@@ -33,9 +39,9 @@ class DistanceTables(NamedTuple):
     reach: FloatArray
     """How much the distance decreases at most with either joint [m/rad], shape (tables, 2)."""
     first: IntArray
-    """First cell of each table, shape (tables,)."""
-    cells: NDArray[np.uint8]
-    """Distances at the centres of the cells in `UNIT`, row by row, table by table."""
+    """First corner of each table, shape (tables,)."""
+    corners: NDArray[np.uint8]
+    """Distances at the corners of the cells in `UNIT`, row by row, table by table."""
 
 
 def arranged(distances: BodyDistances, bodies: int) -> DistanceTables:
@@ -55,25 +61,52 @@ def arranged(distances: BodyDistances, bodies: int) -> DistanceTables:
         size=np.array(distances.size, np.int64),
         reach=np.array(distances.reach, np.float64),
         first=np.concatenate([[0], np.cumsum(sizes)])[:-1].astype(np.int64),
-        cells=np.array(distances.cells, np.uint8),
+        corners=np.array(distances.corners, np.uint8),
     )
 
 
 @inner
 def distance_bound(distances: DistanceTables, n: int, q: FloatArray) -> float:
-    """Return a lower bound of the distance of table n at joint angles q [m]."""
-    at, off = distances.first[n], 0.0
-    stride = distances.size[n, 1]
-    for m in range(2):
-        count = distances.size[n, m]
-        turns = q[distances.joint[n, m]] * (1.0 / FULL_TURN)
-        place = (turns - np.floor(turns)) * count
-        # Of a turn rounded up to 1, the last cell.
-        cell = min(int(place), count - 1)
-        off += distances.reach[n, m] * abs(place - cell - 0.5) * (FULL_TURN / count)
-        at += cell * stride
-        stride = 1
-    return distances.cells[at] * UNIT - off
+    """Return a lower bound of the distance of table n at joint angles q [m].
+
+    It is `NOTHING` where none is known. In a cell, the square of the distance is interpolated
+    between the corners, less what its curvature can take away: `DistanceTable.bound` says why.
+    """
+    height, width = distances.size[n, 0], distances.size[n, 1]
+    row, u, lost_by_first = _place(distances, n, FIRST, q)
+    column, v, lost_by_second = _place(distances, n, SECOND, q)
+    here = distances.first[n] + row * width
+    there = distances.first[n] + (row + 1) % height * width
+    after = (column + 1) % width
+    square = (1.0 - u) * (
+        (1.0 - v) * _squared(distances, here + column) + v * _squared(distances, here + after)
+    ) + u * (
+        (1.0 - v) * _squared(distances, there + column) + v * _squared(distances, there + after)
+    )
+    square -= lost_by_first + lost_by_second
+    return np.sqrt(square) if square > 0.0 else NOTHING
+
+
+@inner
+def _place(distances: DistanceTables, n: int, m: int, q: FloatArray) -> tuple[int, float, float]:
+    """Return the cell of joint m of table n, the fraction of the way across it, and what is lost.
+
+    What is lost is by how much the square of the distance can be below what is interpolated [m^2].
+    """
+    count, reach = distances.size[n, m], distances.reach[n, m]
+    turns = q[distances.joint[n, m]] * (1.0 / FULL_TURN)
+    place = (turns - np.floor(turns)) * count
+    # Of a turn rounded up to 1, the last cell.
+    cell = min(int(place), count - 1)
+    way, step = place - cell, FULL_TURN / count
+    return cell, way, reach * (reach + FARTHEST) * step * step * way * (1.0 - way)
+
+
+@inner
+def _squared(distances: DistanceTables, at: int) -> float:
+    """Return the square of the distance that a corner holds [m^2]."""
+    distance = distances.corners[at] * UNIT
+    return distance * distance
 
 
 @inner
@@ -113,19 +146,19 @@ def may_come_apart(
         middle = 0.5 * (start[joint] + end[joint])
         half = 0.5 * excess * abs(end[joint] - start[joint])
         low = int(np.floor((middle - half) * (count / FULL_TURN)))
-        cells = int(np.floor((middle + half) * (count / FULL_TURN))) - low + 1
-        if cells > MOST_CELLS:
+        corners = int(np.floor((middle + half) * (count / FULL_TURN))) - low + 2
+        if corners > MOST_CORNERS:
             return True
         if m == 0:
-            first_row, rows = low, cells
+            first_row, rows = low, corners
         else:
-            first_column, columns = low, cells
-    if rows * columns > MOST_CELLS:
+            first_column, columns = low, corners
+    if rows * columns > MOST_CORNERS:
         return True
     height, width = distances.size[n, 0], distances.size[n, 1]
     for i in range(first_row, first_row + rows):
         for j in range(first_column, first_column + columns):
             at = distances.first[n] + (i % height) * width + j % width
-            if distances.cells[at] * UNIT >= gap:
+            if distances.corners[at] * UNIT >= gap:
                 return True
     return False

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.model.robots.distances.sources import source_digest
-from tcs.model.robots.distances.table import UNIT, DistanceTable
+from tcs.model.robots.distances.table import FARTHEST, UNIT, DistanceTable
 from tcs.model.robots.extras import model_with_extras
 from tcs.model.robots.robot_file import RobotFile
 from tcs.model.robots.self_collision.clearance import carried_triangles, joints_between
@@ -21,24 +21,25 @@ FloatArray = NDArray[np.float64]
 Joints = tuple[str, str]
 """Two joints of an arm, the one nearer to the base first; the same one twice if it is alone."""
 
-LOSSES = (0.00025, 0.0015)
-"""Least and greatest decrease of the bound from the centre of a cell to its edge, for either joint
-[m]."""
-LOST = 3e-4
+LOSSES = (2e-5, 1e-3)
+"""Least and greatest mean loss of the bound in a cell where the surfaces are `KEPT` apart [m]."""
+KEPT = 0.001
+"""Distance of surfaces, near the usual margin, at which that loss is counted [m]."""
+LOST = 1e-4
 """Share of postures that a table may block although the surfaces are free, which decides between
 these."""
 _NEAR = 0.003
 """Distance beyond the margin up to which free postures are counted for that [m]."""
 MOST = 1 << 22
-"""Greatest number of cells of a table, up to whole blocks."""
+"""Greatest number of corners of cells of a table, up to whole blocks."""
 TOUCHING = 0.005
 """Gap up to which shapes count as touching [m]: a margin of the robot file may be as wide."""
 ENOUGH = 0.003
-"""Distance [m] all over a block of cells above which its cells are not measured one by one."""
+"""Distance [m] all over a block of corners above which they are not measured one by one."""
 LEAST_SHARE = 5e-4
 """Least share of postures that a pair blocks by its shapes alone for which it gets a table."""
 BLOCKS = (64, 16, 4, 1)
-"""Cells along the edges of the blocks that are measured, coarse blocks first."""
+"""Corners along the edges of the blocks that are measured, coarse blocks first."""
 ROUNDING = 1e-6
 """Subtracted from measured distances [m], above rounding errors."""
 
@@ -46,7 +47,7 @@ ROUNDING = 1e-6
 def measured_tables(
     robot: RobotFile,
     *,
-    postures: int = 4000,
+    postures: int = 10_000,
     seed: int = 0,
     only: Collection[frozenset[str]] | None = None,
     on_pair: Callable[[BodyPair, float], None] = lambda pair, share: None,
@@ -121,8 +122,9 @@ def _blocking(
     postures: int,
     seed: int,
 ) -> Iterator[tuple[SurfacePair, FloatArray]]:
-    """Yield the distances of each pair's surfaces where they are free and its shapes are not [m].
+    """Yield the distances of each pair's surfaces where its shapes touch and all are free [m].
 
+    Free are postures in which no pair is in contact by its surfaces, of those that are looked at.
     Of several choices of joints, those of the choice that shows most of the postures to be free.
     """
     plant = SelfCollision(robot)
@@ -135,13 +137,21 @@ def _blocking(
     found: dict[BodyPair, list[list[float]]] = {
         pair: [[] for _ in choices] for pair, choices in surfaces.items()
     }
+    enough = robot.self_margin + 2.0 * _NEAR
     for positions in sample_positions(robot, postures, seed):
-        for names in plant.touching(positions):
-            pair = of_names[frozenset(names)]
-            for surface, distances in zip(surfaces[pair], found[pair], strict=True):
-                distance = surface.distance(*(positions[name] for name in surface.joints))
+        touching = {
+            pair: [
+                surface.distance(*(positions[name] for name in surface.joints), enough)
+                for surface in surfaces[pair]
+            ]
+            for pair in (of_names[frozenset(names)] for names in plant.touching(positions))
+        }
+        if any(max(distances) < robot.self_margin for distances in touching.values()):
+            continue
+        for pair, distances in touching.items():
+            for free, distance in zip(found[pair], distances, strict=True):
                 if distance >= robot.self_margin:
-                    distances.append(distance)
+                    free.append(distance)
     for pair, choices in surfaces.items():
         best = int(np.argmax([len(distances) for distances in found[pair]]))
         yield choices[best], np.array(found[pair][best])
@@ -153,13 +163,13 @@ def measured_table(surfaces: SurfacePair, robot: RobotFile, loss: float) -> Dist
     Args:
         surfaces: The surfaces.
         robot: The robot.
-        loss: Decrease of the bound from the centre of a cell to its edge, for either joint [m];
-            more if the table would have more than `MOST` cells.
+        loss: What the bound loses in the mean over a cell where the surfaces are `KEPT` apart [m];
+            more if the table would have more than `MOST` corners.
     """
     reach = surfaces.reach()
     limits = robot.with_choices(limits="hard").without_ranges.joint_limits()
-    wide = max(loss, math.pi * math.sqrt(reach[0] * reach[1] / MOST))
-    blocks = [max(1, math.ceil(math.pi * r / (wide * BLOCKS[0]))) for r in reach]
+    width = max(_width(loss), 2.0 * math.pi * math.sqrt(reach[0] * reach[1] / MOST))
+    blocks = [max(1, math.ceil(2.0 * math.pi * r / (width * BLOCKS[0]))) for r in reach]
     if surfaces.is_of_one_joint:
         count = (blocks[0] * BLOCKS[0], 1)
     else:
@@ -171,10 +181,10 @@ def measured_table(surfaces: SurfacePair, robot: RobotFile, loss: float) -> Dist
     ]
     if surfaces.is_of_one_joint:
         allowed[1] = np.ones(1, np.bool_)
-    cells = np.zeros(count, np.uint8)
+    corners = np.zeros(count, np.uint8)
     wanted = np.ones([math.ceil(n / BLOCKS[0]) for n in count], np.bool_)
     for level, edge in enumerate(BLOCKS):
-        wanted = _measure(surfaces, cells, wanted, edge, steps, reach, allowed)
+        wanted = _measure(surfaces, corners, wanted, edge, steps, reach, allowed)
         if level + 1 < len(BLOCKS):
             finer = edge // BLOCKS[level + 1]
             wanted = wanted.repeat(finer, axis=0)
@@ -183,58 +193,67 @@ def measured_table(surfaces: SurfacePair, robot: RobotFile, loss: float) -> Dist
         pair=surfaces.pair,
         joints=surfaces.joints,
         reach=reach,
-        cells=cells,
+        corners=corners,
         source=source_digest(robot, surfaces.pair),
     )
 
 
+def _width(loss: float) -> float:
+    """Return how far a joint moves a point at its reach from corner to corner, for a mean loss [m].
+
+    By `DistanceTable.bound`, the square of the distance loses `width^2 t (1 - t)` for either of two
+    joints, `width^2 / 6` in the mean, and the distance as much over its double.
+    """
+    return math.sqrt(6.0 * KEPT * loss)
+
+
 def _measure(
     surfaces: SurfacePair,
-    cells: NDArray[np.uint8],
+    corners: NDArray[np.uint8],
     wanted: NDArray[np.bool_],
     edge: int,
     steps: tuple[float, float],
     reach: tuple[float, float],
     allowed: list[NDArray[np.bool_]],
 ) -> NDArray[np.bool_]:
-    """Measure blocks of cells at their centres; fill the cells of those that are far apart.
+    """Measure blocks of corners at their middle; fill the corners of those that are far apart.
 
     Args:
         surfaces: The surfaces.
-        cells: Filled, as in `DistanceTable`.
+        corners: Filled, as in `DistanceTable`.
         wanted: Which blocks to measure.
-        edge: Cells along the edges of a block.
+        edge: Corners along the edges of a block.
         steps: Edges of a cell [rad].
         reach: From `reach`.
-        allowed: Whether the joints can be in each cell.
+        allowed: Whether the joints can be in a cell at each corner.
 
     Returns:
         The blocks whose parts have to be measured.
     """
     edges = (edge, 1 if surfaces.is_of_one_joint else edge)
     found = np.full(wanted.shape, np.inf)
-    off = [
-        r * step * np.abs(np.arange(n) + 0.5 - 0.5 * n)
-        for r, step, n in zip(reach, steps, edges, strict=True)
-    ]
-    lost = off[0][:, None] + off[1]
-    # At the far edges of the block.
-    slack = sum(0.5 * r * step * n for r, step, n in zip(reach, steps, edges, strict=True))
+    # At the corners at the edges of the block.
+    lost = sum(0.5 * r * step * (n - 1) for r, step, n in zip(reach, steps, edges, strict=True))
+    # At the far edges of the cells around the block.
+    slack = sum(0.5 * r * step * (n + 1) for r, step, n in zip(reach, steps, edges, strict=True))
     for i, j in np.argwhere(wanted):
         rows = slice(i * edges[0], (i + 1) * edges[0])
         columns = slice(j * edges[1], (j + 1) * edges[1])
         if not (allowed[0][rows].any() and allowed[1][columns].any()):
             wanted[i, j] = False
             continue
-        middle = (i + 0.5) * edges[0] * steps[0], (j + 0.5) * edges[1] * steps[1]
+        middle = (
+            (i * edges[0] + 0.5 * (edges[0] - 1)) * steps[0],
+            (j * edges[1] + 0.5 * (edges[1] - 1)) * steps[1],
+        )
         touching = surfaces.shapes_touch(*middle, TOUCHING + slack)
         if edge == 1 and not touching:
             continue
-        found[i, j] = max(0.0, surfaces.distance(*middle) - ROUNDING)
+        found[i, j] = max(0.0, surfaces.distance(*middle, lost + FARTHEST) - ROUNDING)
         # Where shapes are apart, they decide.
-        if edge == 1 or not touching or found[i, j] - lost.max() >= ENOUGH:
-            units = np.floor(np.maximum(found[i, j] - lost, 0.0) / UNIT)
-            cells[rows, columns] = np.minimum(units, 255.0).astype(np.uint8)
+        if edge == 1 or not touching or found[i, j] - lost >= ENOUGH:
+            least = float(np.clip(found[i, j] - lost, 0.0, FARTHEST))
+            corners[rows, columns] = math.floor(least / UNIT)
             wanted[i, j] = False
     if edge == 1:
         return wanted
@@ -246,11 +265,12 @@ def _measure(
 
 
 def _reachable(count: int, step: float, limits: tuple[float, float]) -> NDArray[np.bool_]:
-    """Return which cells of a full turn hold angles within limits [rad]."""
+    """Return which corners of a full turn are those of a cell with angles within limits [rad]."""
     low, high = limits
     if not high - low < 2.0 * math.pi:
         return np.ones(count, dtype=np.bool_)
     begin = np.arange(count) * step
     # The next angle at or above the lower limit that is in the cell.
     ahead = np.mod(low - begin, 2.0 * math.pi)
-    return np.asarray((ahead < step) | (np.mod(begin - low, 2.0 * math.pi) <= high - low))
+    cells = (ahead < step) | (np.mod(begin - low, 2.0 * math.pi) <= high - low)
+    return np.asarray(cells | np.roll(cells, 1))

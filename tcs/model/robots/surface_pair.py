@@ -109,17 +109,24 @@ class SurfacePair:
         """Whether there is a single joint between the bodies."""
         return self.joints[0] == self.joints[1]
 
-    def distance(self, first: float, second: float) -> float:
+    def distance(self, first: float, second: float, farthest: float = np.inf) -> float:
         """Return the distance of the surfaces at two joint angles [m], 0 where they meet.
 
         It is 0 too where one may be within the other.
+
+        Args:
+            first: Angle of the first joint [rad].
+            second: Angle of the second joint [rad].
+            farthest: Distance that is enough to know [m]: nothing greater is returned.
         """
         import coal
 
         R, p = self._pose(first, second)
-        X, request = coal.Transform3s(R, p), coal.DistanceRequest()
+        X, request, result = coal.Transform3s(R, p), coal.DistanceRequest(), coal.DistanceResult()
+        # Pairs of triangles that are farther apart than what was found are not looked at.
+        result.min_distance = min(farthest, result.min_distance)
         found = coal.distance(
-            self.models[0], coal.Transform3s(), self.models[1], X, request, coal.DistanceResult()
+            self.models[0], coal.Transform3s(), self.models[1], X, request, result
         )
         if found <= 0.0 or self._may_enclose(R, p):
             return 0.0
@@ -210,8 +217,9 @@ def _all_within(points: FloatArray, hull: Hull) -> bool:
     """Return whether all points are within a convex hull; none is within a flat one."""
     if not len(hull.faces):
         return False
-    # Nearly always one of a few points shows that they are not.
-    return _are_within(points[:8], hull) and _are_within(points, hull)
+    # Nearly always one of a few points, from all over them, shows that they are not.
+    few = points[:: max(1, len(points) // 8)]
+    return _are_within(few, hull) and _are_within(points, hull)
 
 
 def _are_within(points: FloatArray, hull: Hull) -> bool:

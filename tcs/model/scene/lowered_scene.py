@@ -94,7 +94,7 @@ def _flat(item: object) -> Iterator[object]:
     if isinstance(item, SceneArrays):
         # So do scenes without free goals, and without tables of distances.
         freedom = (item.freedom,) if len(item.freedom) else ()
-        distances = (item.distances,) if len(item.distances.cells) else ()
+        distances = (item.distances,) if len(item.distances.corners) else ()
         item = (*item[:-2], *freedom, *distances)
     if isinstance(item, tuple):
         for member in item:

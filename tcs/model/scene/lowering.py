@@ -138,9 +138,9 @@ def _distances(scene: Scene, bodies: tuple[str, ...]) -> BodyDistances:
     return BodyDistances(
         body=np.array([[number[name] for name in t.pair] for t in tables], np.int64),
         joint=np.array([[joint[name] for name in t.joints] for t in tables], np.int64),
-        size=np.array([t.cells.shape for t in tables], np.int64),
+        size=np.array([t.corners.shape for t in tables], np.int64),
         reach=np.array([t.reach for t in tables], np.float64),
-        cells=np.concatenate([t.cells.ravel() for t in tables]),
+        corners=np.concatenate([t.corners.ravel() for t in tables]),
     )
 
 

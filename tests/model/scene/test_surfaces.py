@@ -75,7 +75,7 @@ def test_surfaces_decide_where_the_table_says_so(specs, postures):
 
 def test_a_table_that_lies_is_found_out(specs, postures):
     tables = tuple(
-        replace(table, cells=np.full_like(table.cells, 255))
+        replace(table, corners=np.full_like(table.corners, 255))
         for table in tables_in_force(specs[0].robot)
     )
     pairs = {frozenset(table.pair) for table in tables}

@@ -16,8 +16,8 @@ from tcs.files.unchanged import kept_while_unchanged
 from tcs.files.writing import whole_file
 from tcs.model.robots.distances.table import DistanceTable
 
-MOST_CELLS = 1 << 24
-"""Most cells of one table."""
+MOST_CORNERS = 1 << 24
+"""Most corners of one table."""
 _HEADER = "header"
 
 
@@ -36,7 +36,7 @@ def write_tables(path: Path, tables: Sequence[DistanceTable], source: str) -> No
         {"pair": t.pair, "joints": t.joints, "reach": t.reach, "source": t.source} for t in tables
     ]
     header = json.dumps({"source": source, "tables": described})
-    arrays: dict[str, Any] = {f"cells_{n}": t.cells for n, t in enumerate(tables)}
+    arrays: dict[str, Any] = {f"corners_{n}": t.corners for n, t in enumerate(tables)}
     arrays[_HEADER] = np.frombuffer(header.encode(), np.uint8)
     with whole_file(path, "tables of distances") as stream:
         np.savez_compressed(stream, **arrays)
@@ -53,34 +53,35 @@ def read_tables(path: Path) -> tuple[DistanceTable, ...]:
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as arrays:
             header = json.loads(bytes(arrays[_HEADER]))
             return tuple(
-                _table(fields, arrays[f"cells_{n}"]) for n, fields in enumerate(header["tables"])
+                _table(fields, arrays[f"corners_{n}"]) for n, fields in enumerate(header["tables"])
             )
     except OSError as error:
         raise RobotError(f"tables of distances '{path}': {error}.") from error
     except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise RobotError(
-            f"'{path}' is no file of distances, or damaged. Restore it, or remove the field "
-            "'distances' of the robot file: shapes alone decide then."
+            f"'{path}' is no file of distances, damaged, or of an earlier version. Restore or "
+            "measure it again, or remove the field 'distances' of the robot file: shapes alone "
+            "decide then."
         ) from error
 
 
-def _table(fields: dict[str, Any], cells: Any) -> DistanceTable:
-    """Return a table from its description and its cells.
+def _table(fields: dict[str, Any], corners: Any) -> DistanceTable:
+    """Return a table from its description and its corners.
 
     Raises:
         ValueError: If they are none.
     """
-    if cells.dtype != np.uint8 or cells.ndim != 2 or not 0 < cells.size <= MOST_CELLS:
-        raise ValueError("cells")
+    if corners.dtype != np.uint8 or corners.ndim != 2 or not 0 < corners.size <= MOST_CORNERS:
+        raise ValueError("corners")
     pair, joints, reach = (tuple(fields[name]) for name in ("pair", "joints", "reach"))
     # Of a reach below 0, or that is not a number, nothing follows.
     if not (len(pair) == len(joints) == len(reach) == 2 and all(r >= 0.0 for r in reach)):
         raise ValueError("fields")
-    cells.flags.writeable = False
+    corners.flags.writeable = False
     return DistanceTable(
         pair=(str(pair[0]), str(pair[1])),
         joints=(str(joints[0]), str(joints[1])),
         reach=(float(reach[0]), float(reach[1])),
-        cells=cells,
+        corners=corners,
         source=str(fields["source"]),
     )
