@@ -141,8 +141,7 @@ def _blocking(
     for positions in sample_positions(robot, postures, seed):
         touching = {
             pair: [
-                surface.distance(*(positions[name] for name in surface.joints), enough)
-                for surface in surfaces[pair]
+                surface.distance(*surface.angles(positions), enough) for surface in surfaces[pair]
             ]
             for pair in (of_names[frozenset(names)] for names in plant.touching(positions))
         }

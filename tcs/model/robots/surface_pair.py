@@ -109,6 +109,11 @@ class SurfacePair:
         """Whether there is a single joint between the bodies."""
         return self.joints[0] == self.joints[1]
 
+    def angles(self, positions: Mapping[str, float]) -> tuple[float, float]:
+        """Return the angles of both joints [rad], of the positions of all."""
+        first, second = self.joints
+        return positions[first], positions[second]
+
     def distance(self, first: float, second: float, farthest: float = np.inf) -> float:
         """Return the distance of the surfaces at two joint angles [m], 0 where they meet.
 

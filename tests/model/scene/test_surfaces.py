@@ -40,9 +40,9 @@ def postures(specs):
         q = rng.uniform(*limits.T)
         at = dict(zip(robot.arm_joints, q, strict=True))
         bounds = [table.bound(at) for table in tables_in_force(robot)]
-        bound = min(bounds, key=lambda b: abs(b - 0.003))
+        bound = min(bounds, key=lambda b: abs(b - 0.002))
         clear = bound > robot.self_margin
-        if wanted[clear] and bound < 0.006:
+        if wanted[clear] and bound < 0.003:
             wanted[clear] -= 1
             chosen.append(q)
     plain = Scene(specs[1])
