@@ -48,15 +48,16 @@ def test_postures_agree_with_the_reference(chain, rng):
 
 def test_pairs_that_one_or_two_joints_keep_apart_are_left_out(chain, rng):
     scene = toy_scene(chain, 0, obstacles=30)
-    # The first shape circles about the first axis, and meets a ball on its way.
+    # The first two shapes turn about the first axes, and each meets a ball on its way.
     out = np.array([0.35, 0.0, 0.1])
     R_WA, p_WA = arm_base(scene, toy_grid(), HERE)
-    R_AL, p_AL = link_poses(chain, np.array([1.0, 0, 0, 0, 0, 0, 0]))[0]
-    ball = placed(SPHERE, [0.05, 0, 0], p=R_WA @ (R_AL @ out + p_AL) + p_WA)
     p = scene.arm.p.copy()
-    p[0, 0] = out
+    p[0, :2] = out
     arm = scene.arm._replace(frame=np.array([1, 2, 4, 4, 7, 7], np.int8), p=p)
-    scene = with_obstacle(scene._replace(arm=arm), ball)
+    scene = scene._replace(arm=arm)
+    for R_AL, p_AL in link_poses(chain, np.array([1.0, 0.6, 0, 0, 0, 0, 0]))[:2]:
+        ball = placed(SPHERE, [0.05, 0, 0], p=R_WA @ (R_AL @ out + p_AL) + p_WA)
+        scene = with_obstacle(scene, ball)
     every = motion_scene(build_problem(scene, toy_grid()), HERE)
     work, needed = new_motion_workspace(every), np.ones(len(every.pair), np.bool_)
     list_needed(every, work, needed)
@@ -65,7 +66,8 @@ def test_pairs_that_one_or_two_joints_keep_apart_are_left_out(chain, rng):
     for few in (joints == 1, joints == 2):
         assert 0 < needed[few].sum() < few.sum()
     postures = [within_limits(rng, chain) for _ in range(200)]
-    for kept, touches in ((~needed, False), (needed & (joints == 1), True)):
+    by_joints = [(needed & (joints == n), True) for n in (1, 2)]
+    for kept, touches in ((~needed, False), *by_joints):
         some = with_pairs(every, kept)
         work = new_motion_workspace(some)
         assert any(posture_contact(some, work, q) != NO_PAIR for q in postures) == touches
