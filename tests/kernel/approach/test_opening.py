@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tcs.kernel.approach.grid import NOWHERE, PIECES, place_columns, place_levels
+from tcs.kernel.approach.grid import NOWHERE, PIECES, column_at, place_columns, place_levels
 from tcs.kernel.approach.memory import Approach, new_approach
 from tcs.kernel.approach.opening import lead_on, make_whole, open_branch, open_goal
 from tcs.kernel.approach.scene import approach_scene
@@ -20,20 +20,30 @@ MOST = 6
 
 
 @jit
+def end_of(approach: Approach, b: int, column: int) -> int:
+    """Return the column in which the line from a column ends, NOWHERE if it is not complete."""
+    if approach.grid.onward[b, 0, column] == NOWHERE:
+        return NOWHERE
+    return column_at(approach.grid, b, column, PIECES)
+
+
+@jit
 def looked_at(problem: Problem, approach: Approach, b: int, order: IntArray, seen: IntArray) -> int:
     """Fill where lines lead from columns looked at in an order, whole last; return their number."""
     place_levels(problem.arm, approach.work, approach.offset, approach.grid)
-    columns, onward = approach.columns, approach.grid.onward[b]
+    columns = approach.columns
     columns[0], columns[1] = place_columns(problem.arm, approach.grid, 0.3), MOST
     open_goal(problem, approach, b, 0, columns[0] - 1)
     for i in order:
         if i < columns[0]:
             lead_on(problem, approach, b, i)
-            seen[0, i] = onward[0, i]
+            seen[0, i] = end_of(approach, b, i)
     make_whole(problem, approach, b)
-    seen[1] = onward[0]
+    for i in range(columns[0]):
+        seen[1, i] = end_of(approach, b, i)
     open_branch(problem, approach, b, 0, columns[0] - 1)
-    seen[2] = onward[0]
+    for i in range(columns[0]):
+        seen[2, i] = end_of(approach, b, i)
     return columns[0]
 
 

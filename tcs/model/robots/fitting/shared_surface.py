@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import itertools
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.errors import RobotError
+from tcs.errors import RobotError, UnknownNameError
 from tcs.kernel.enclosing.holding import contains_points
 from tcs.model.robots.cutting import cut, distinct, halved, longest_edges
 from tcs.model.robots.fitting.bounding import (
@@ -21,6 +21,7 @@ from tcs.model.robots.fitting.bounding import (
 )
 from tcs.model.robots.fitting.reduction import SortedPieces, contain, rounded_box
 from tcs.model.robots.primitives import FINEST, Primitive
+from tcs.model.robots.robot_file import RobotFile
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -33,8 +34,8 @@ _CUTS = (0.2, 0.35, 0.5, 0.65, 0.8)
 class SharedSurface(ABC):
     """Shapes that contain a surface together, each of which may change as long as they do.
 
-    What shapes should leave free is numbered by whoever derives from this, such as the cells of a
-    grid outside the body. What a shape holds of it has a cost unless another one holds it too.
+    What shapes should leave free is numbered by the class that derives from this, such as the cells
+    of a grid outside the body. What a shape holds of it has a cost unless another one holds it too.
     """
 
     def __init__(
@@ -204,6 +205,29 @@ class SharedSurface(ABC):
     def _contained(self, shape: Primitive) -> BoolArray:
         inside = contains_points(rounded_box(shape), self._inside)
         return np.concatenate([self._placed.within(shape), inside])
+
+
+def by_body(
+    robot: RobotFile, shapes: Iterable[Primitive], named: Iterable[str], surfaces: Container[str]
+) -> dict[str, tuple[Primitive, ...]]:
+    """Return the shapes of each body.
+
+    Args:
+        robot: The robot.
+        shapes: Its primitives.
+        named: Bodies that must have shapes and a surface.
+        surfaces: Bodies with a surface.
+
+    Raises:
+        UnknownNameError: If one of these bodies has none.
+    """
+    found: dict[str, tuple[Primitive, ...]] = {}
+    for shape in shapes:
+        found[shape.body] = (*found.get(shape.body, ()), shape)
+    for body in named:
+        if body not in found or body not in surfaces:
+            raise UnknownNameError("body", body, found, where=f"primitives '{robot.primitives}'")
+    return found
 
 
 def around(body: str, shape: Primitive, points: FloatArray) -> list[Primitive]:

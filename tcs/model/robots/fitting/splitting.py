@@ -6,9 +6,8 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import delayed
 
-from tcs.errors import UnknownNameError
 from tcs.kernel.collide import BOUND
 from tcs.model.robots.fitting.bounding import enclose, tightest_orientation
 from tcs.model.robots.fitting.cleared_boxes import (
@@ -20,12 +19,14 @@ from tcs.model.robots.fitting.cleared_boxes import (
 from tcs.model.robots.fitting.enclosure import surfaces_to_enclose
 from tcs.model.robots.fitting.filling import fillers
 from tcs.model.robots.fitting.orienting import least_costly
+from tcs.model.robots.fitting.processes import ordered
 from tcs.model.robots.fitting.shared_surface import (
     BoolArray,
     FloatArray,
     IntArray,
     SharedSurface,
     around,
+    by_body,
     within_capsule,
 )
 from tcs.model.robots.fitting.tightening import space_of
@@ -89,17 +90,13 @@ def split_where_struck(
         UnknownNameError: If a body has no primitive.
         RobotError: If a mesh cannot be read, or primitives do not enclose the surface of a body.
     """
-    found: dict[str, tuple[Primitive, ...]] = {}
-    for shape in shapes:
-        found[shape.body] = (*found.get(shape.body, ()), shape)
     surfaces = {body: surface for body, (_, _, surface) in surfaces_to_enclose(robot).items()}
-    for body in most:
-        if body not in found or body not in surfaces:
-            raise UnknownNameError("body", body, found, where=f"primitives '{robot.primitives}'")
-    new = Parallel(jobs)(
+    found = by_body(robot, shapes, most, surfaces)
+    calls = (
         delayed(_split_body)(robot, body, found[body], surfaces, number, draws)
         for body, number in most.items()
     )
+    new = ordered(jobs, calls)
     found |= dict(zip(most, new, strict=True))
     return tuple(shape for fitted in found.values() for shape in fitted)
 

@@ -10,7 +10,6 @@ import numpy as np
 from joblib import delayed
 from numpy.typing import NDArray
 
-from tcs.errors import UnknownNameError
 from tcs.kernel.enclosing.holding import set_cells_within
 from tcs.model.robots.fitting.bounding import enclose
 from tcs.model.robots.fitting.candidates import thinned
@@ -25,6 +24,7 @@ from tcs.model.robots.fitting.shared_surface import (
     IntArray,
     SharedSurface,
     around,
+    by_body,
     within_capsule,
 )
 from tcs.model.robots.fitting.solid import CLOSING as USUAL_CLOSING
@@ -94,13 +94,9 @@ def tightened(
         UnknownNameError: If a body has no primitive.
         RobotError: If a mesh cannot be read, or primitives do not enclose the surface of a body.
     """
-    found: dict[str, tuple[Primitive, ...]] = {}
-    for shape in shapes:
-        found[shape.body] = (*found.get(shape.body, ()), shape)
     surfaces, tasks = surfaces_to_enclose(robot), {}
+    found = by_body(robot, shapes, splits, surfaces)
     for body, most in splits.items():
-        if body not in found or body not in surfaces:
-            raise UnknownNameError("body", body, found, where=f"primitives '{robot.primitives}'")
         given = (*found[body], *rounds.get(body, ()))
         tasks[body] = body, given, surfaces[body][2], spots.get(body, ()), most
     # The longest first: the one that is left at the end should be short.
