@@ -18,6 +18,7 @@ import resource
 import subprocess
 import sys
 import tempfile
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -104,7 +105,8 @@ NONE: dict[str, list[list[str]]] = {"rows": []}
 HEIGHTS = (0.2, 0.6, 0.9, 1.2)
 COLUMNS = (
     "robot",
-    "drafted in [s of processor]",
+    "drafted in [s]",
+    "of processor [s]",
     "shapes",
     "check",
     "pairs reached",
@@ -114,11 +116,12 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Run:
-    """What a command did: its exit code, output, last line of messages, and processor time [s]."""
+    """What a command did: its exit code, output, last line of messages, and time [s]."""
 
     code: int | None
     output: str
     message: str
+    processor: float
     seconds: float
     is_one_line: bool = True
     """Whether nothing but progress precedes the last line: no traceback."""
@@ -193,7 +196,7 @@ def parse():
     return found.parse_args()
 
 
-def outcome(urdf: str, tool: str, options) -> tuple[str, str, str, str, str]:
+def outcome(urdf: str, tool: str, options) -> tuple[str, ...]:
     """Return the cells of a robot's row after its name."""
     with tempfile.TemporaryDirectory() as text:
         folder = Path(text)
@@ -203,7 +206,7 @@ def outcome(urdf: str, tool: str, options) -> tuple[str, str, str, str, str]:
         if drafted.code != 0:
             clear = drafted.code == 1 and drafted.is_one_line
             said = drafted.message if clear else f"NOT ONE LINE: {drafted.message}"
-            return seconds(drafted), "", "", "", said
+            return *times(drafted), "", "", "", said
         shapes = len((folder / "drafted_primitives.csv").read_text().splitlines()) - 1
         checked = run(
             ["robot", "check", "drafted.yaml", "--samples", "100", "--json"], folder, options.limit
@@ -212,11 +215,11 @@ def outcome(urdf: str, tool: str, options) -> tuple[str, str, str, str, str]:
         problems = found.get("problems", [checked.message])
         scored = run(score_words(folder), folder, options.limit)
         if scored.code != 0:
-            return seconds(drafted), str(shapes), str(checked.code), "", scored.message
+            return *times(drafted), str(shapes), str(checked.code), "", scored.message
         result = json.loads(scored.output)
         reached = result["reached_pairs"]
         return (
-            seconds(drafted),
+            *times(drafted),
             str(shapes),
             "sound" if checked.code == 0 else f"{len(problems)} to review",
             f"{reached:,} of {result['pairs']:,}",
@@ -244,7 +247,7 @@ def score_words(folder: Path) -> list[str]:
 def run(words: list[str], folder: Path, limit: float) -> Run:
     """Run a command of tcs in a folder."""
     command = [sys.executable, "-c", "from tcs.cli import main; main()", *words]
-    before = processor_time()
+    start, before = time.perf_counter(), processor_time()
     done = subprocess.run(
         command,
         cwd=folder,
@@ -253,15 +256,17 @@ def run(words: list[str], folder: Path, limit: float) -> Run:
         env=os.environ,
         preexec_fn=lambda: bound(limit),
     )
-    used = processor_time() - before
+    used, passed = processor_time() - before, time.perf_counter() - start
     if done.returncode < 0:
-        return Run(None, "", f"ended by signal {-done.returncode} after {used:.0f} s", used, False)
+        return Run(
+            None, "", f"ended by signal {-done.returncode} after {used:.0f} s", used, passed, False
+        )
     lines = done.stderr.strip().splitlines()
     message = lines[-1].removeprefix("tcs: ") if lines else ""
     # The folder is another one on each machine.
     message = message.replace(f"{data_folder()}/", "")
     is_one_line = all(line.startswith("tcs: ") for line in lines)
-    return Run(done.returncode, done.stdout, message, used, is_one_line)
+    return Run(done.returncode, done.stdout, message, used, passed, is_one_line)
 
 
 def bound(limit: float) -> None:
@@ -276,9 +281,9 @@ def processor_time() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def seconds(done: Run) -> str:
-    """Return the time of a command as text."""
-    return f"{done.seconds:.0f}"
+def times(done: Run) -> tuple[str, str]:
+    """Return the time of a command and that of the processors as texts [s]."""
+    return f"{done.seconds:.0f}", f"{done.processor:.0f}"
 
 
 if __name__ == "__main__":
