@@ -10,13 +10,13 @@ from peer_problems import Answer, Bench, Pair
 from tcs.kernel.analytic.scratch import Search, new_search
 from tcs.kernel.arrays import IntArray
 from tcs.kernel.cache import jit
-from tcs.kernel.contacts import Workspace, new_workspace
 from tcs.kernel.problem import Problem
 from tcs.kernel.scores import Scores
 
 # `score_slice` does the same with memory of its own, but is not compiled: a call from Python takes
 # longer than a pair.
 from tcs.kernel.sweep import _score_slice
+from tcs.kernel.workspace import Workspace, new_workspace
 from tcs.placement.tables import Reason
 
 REPEATS = 32

@@ -16,11 +16,11 @@ from tcs.files.memory import check_room
 from tcs.files.paths import data_reference
 from tcs.files.quantities import MAP_STEP
 from tcs.kernel.arrays import BoolArray, FloatArray
-from tcs.kernel.contacts import new_workspace
 from tcs.kernel.postures import free_postures, measures, tool_poses
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.scores import REACHED, Scores
 from tcs.kernel.sweep import gripper_contacts, score_slice
+from tcs.kernel.workspace import new_workspace
 from tcs.model.grid import Axis, Grid
 from tcs.model.robots import RobotFile, load_robot
 from tcs.model.scene import EnvironmentFile, LoweredScene, Scene, SceneSpec, lower

@@ -7,8 +7,8 @@ import numpy as np
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, jit
 from tcs.kernel.collide import BOUND, CENTRE, ROTATION, move
-from tcs.kernel.contacts import Workspace
 from tcs.kernel.problem import Problem
+from tcs.kernel.workspace import Workspace
 
 
 @jit

@@ -9,7 +9,6 @@ from tcs.kernel.base_pose import environment_in_arm_base, place_base
 from tcs.kernel.cache import int_constant, jit
 from tcs.kernel.contacts import (
     NO_CONTACT,
-    Workspace,
     arm_contact,
     gripper_body_contact,
     gripper_environment_contact,
@@ -18,6 +17,7 @@ from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.kinematics import tool_pose
 from tcs.kernel.problem import Problem
 from tcs.kernel.views import unowned
+from tcs.kernel.workspace import Workspace
 
 HERE = int_constant(0)
 """Index of the first base pose and the first environment state."""

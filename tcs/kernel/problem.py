@@ -21,7 +21,7 @@ from tcs.kernel.collide import BOUND, CENTRE, pack
 from tcs.kernel.dexterity import DEFAULT_MEASURE, Dexterity, dexterity
 from tcs.kernel.distances import DistanceTables, arranged
 from tcs.kernel.freedom.goals import FreeGoals, axis_left_free, free_goals
-from tcs.kernel.groups import first_rows, with_boxes, with_group_rows
+from tcs.kernel.groups import Groups, groups_of, with_boxes, with_group_rows
 
 UNCHECKED = -1.0
 """Gap of a pair of shapes that is not checked."""
@@ -32,8 +32,8 @@ TOUCH = 1e-9
 class Problem(NamedTuple):
     """One scene, its goals and its grid.
 
-    The robot's shapes are grouped by body: the rows of shapes are followed by a box around each
-    group. A gap of a box is the greatest gap of its shapes.
+    The robot's shapes are grouped by body: the rows of shapes are followed by those of `Groups`. A
+    gap of a box is the greatest gap of its shapes.
     """
 
     measure: Dexterity
@@ -53,14 +53,14 @@ class Problem(NamedTuple):
     """Number of joints of the arm, as in `Chain`."""
     links: FloatArray
     """The arm's shapes, packed, in link frames, nearest to the tool first, then the boxes around
-    their groups, shape (n_arm + arm groups, 17)."""
+    them, shape (arm rows, 17)."""
     link_frame: IntArray
     """Link of each row in `links`, 7 .. 1 or the number of a coupled link's frame, shape
-    (n_arm + arm groups,)."""
+    (arm rows,)."""
     link_body: IntArray
     """Robot body of each shape in `links`, shape (n_arm,)."""
-    link_first: IntArray
-    """First row in `links` of each group, and n_arm, shape (arm groups + 1,)."""
+    link_groups: Groups
+    """Groups of `links`."""
     gripper_groups: int
     """Number of groups of the gripper, on link 7: the first ones."""
     base_R: FloatArray
@@ -68,12 +68,12 @@ class Problem(NamedTuple):
     base_p: FloatArray
     """Origin of A in B for each torso level [m], shape (torso levels, 3)."""
     body: FloatArray
-    """Shapes of the rest of the robot in B, packed, then the boxes around their groups, shape
-    (torso levels, n_body + body groups, 17)."""
+    """Shapes of the rest of the robot in B, packed, then the boxes around them, shape
+    (torso levels, body rows, 17)."""
     body_A: FloatArray
     """The rows of `body`, in A."""
-    body_first: IntArray
-    """First row in `body` of each group, and n_body, shape (body groups + 1,)."""
+    body_groups: Groups
+    """Groups of `body`."""
     body_spheres: FloatArray
     """Centre and radius of the bounding spheres of the body shapes fixed to the base (0) and
     mounted on the torso (1), in B [m], shape (torso levels, 2, 4)."""
@@ -91,15 +91,13 @@ class Problem(NamedTuple):
     """Number of bodies of the robot."""
     gap_environment: FloatArray
     """Distance [m] that arm and environment shapes must keep, or UNCHECKED, shape
-    (n_arm + arm groups, n_environment)."""
+    (arm rows, n_environment)."""
     gap_body: FloatArray
-    """The same for arm and body shapes, shape (n_arm + arm groups, n_body + body
-    groups)."""
+    """The same for arm and body shapes, shape (arm rows, body rows)."""
     gap_arm: FloatArray
-    """The same for arm shapes among themselves, shape (n_arm + arm groups, n_arm +
-    arm groups)."""
+    """The same for arm shapes among themselves, shape (arm rows, arm rows)."""
     gap_base: FloatArray
-    """The same for body and environment shapes, shape (n_body + body groups, n_environment)."""
+    """The same for body and environment shapes, shape (body rows, n_environment)."""
     widest_gap: float
     """Upper bound of all these distances [m]."""
     arm_radius: float
@@ -146,8 +144,11 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
     widest = max(margin, self_margin, 2.0 * max(float(pad.max(initial=0.0)) for pad in pads))
     links, link_body = pack(scene.arm, order), scene.arm.body[order].astype(np.int64)
     mount, body_body = scene.body.frame.astype(np.int64), scene.body.body.astype(np.int64)
-    link_first, body_first = first_rows(frame, link_body), first_rows(mount, body_body)
+    link_groups = groups_of(scene.arm.p[0, order], frame, link_body)
+    body_groups = groups_of(scene.body.p[0], mount, body_body)
+    in_boxes = np.array([inside[0] for inside in link_groups.in_boxes()], np.int64)
     packed = pack(scene.body)
+    bodies = with_boxes(np.concatenate([packed, pack(body_A)]), body_groups)
     robot_bodies = max(_count(scene.arm), _count(scene.body))
     return Problem(
         measure=dexterity(measure),
@@ -156,16 +157,16 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
         chain_p=with_slides(scene.chain),
         coupled=_own(scene.chain.coupled),
         joints=scene.chain.joints,
-        links=with_boxes(links, link_first)[0],
-        link_frame=np.append(frame, frame[link_first[:-1]]),
+        links=with_boxes(links, link_groups)[0],
+        link_frame=np.append(frame, frame[in_boxes]),
         link_body=link_body,
-        link_first=link_first,
-        gripper_groups=int(np.sum(frame[link_first[:-1]] == 7)),
+        link_groups=link_groups,
+        gripper_groups=int(np.sum(frame[link_groups.first[:-1]] == 7)),
         base_R=_own(scene.arm_base_R),
         base_p=_own(scene.arm_base_p),
-        body=with_boxes(packed, body_first),
-        body_A=with_boxes(pack(body_A), body_first),
-        body_first=body_first,
+        body=_own(bodies[: len(packed)]),
+        body_A=_own(bodies[len(packed) :]),
+        body_groups=body_groups,
         body_spheres=_bounding_spheres(packed, scene.body.frame),
         body_mount=mount,
         body_body=body_body,
@@ -174,18 +175,18 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
         environment_bodies=_count(scene.environment),
         robot_bodies=robot_bodies,
         gap_environment=with_group_rows(
-            _gaps(scene.arm_vs_environment[order], pads[0], pads[2], margin), link_first
+            _gaps(scene.arm_vs_environment[order], pads[0], pads[2], margin), link_groups
         ),
         gap_body=_with_groups(
-            _gaps(scene.arm_vs_body[order], pads[0], pads[1], self_margin), link_first, body_first
+            _gaps(scene.arm_vs_body[order], pads[0], pads[1], self_margin), link_groups, body_groups
         ),
         gap_arm=_with_groups(
             _gaps(scene.arm_vs_arm[order][:, order], pads[0], pads[0], self_margin),
-            link_first,
-            link_first,
+            link_groups,
+            link_groups,
         ),
         gap_base=with_group_rows(
-            _gaps(scene.body_vs_environment, pads[1], pads[2], margin), body_first
+            _gaps(scene.body_vs_environment, pads[1], pads[2], margin), body_groups
         ),
         widest_gap=widest,
         arm_radius=_arm_radius(scene.chain, links[0], frame) + widest,
@@ -218,7 +219,7 @@ def with_environment(problem: Problem, scene: SceneArrays) -> Problem:
 
 
 def gaps_between(
-    first: SceneArrays, second: SceneArrays, groups: IntArray, other_groups: IntArray
+    first: SceneArrays, second: SceneArrays, groups: Groups, other_groups: Groups
 ) -> FloatArray:
     """Return the distances that the shapes of two arms of one robot must keep [m].
 
@@ -227,11 +228,11 @@ def gaps_between(
     Args:
         first: The scene of one arm.
         second: The scene of the other.
-        groups: `link_first` of the problem of the first.
-        other_groups: `link_first` of the problem of the second.
+        groups: `link_groups` of the problem of the first.
+        other_groups: `link_groups` of the problem of the second.
 
     Returns:
-        Rows and columns in the order of the problems, with those of the groups at the end.
+        Rows and columns in the order of the problems, with those of the boxes at the end.
     """
     pad, other = (scene.arm.pad[arm_order(scene)] for scene in (first, second))
     checked = np.ones((len(pad), len(other)), np.bool_)
@@ -299,9 +300,9 @@ def _own(array: FloatArray) -> FloatArray:
     return np.array(array, dtype=np.float64, order="C")
 
 
-def _with_groups(gaps: FloatArray, first: IntArray, others: IntArray) -> FloatArray:
+def _with_groups(gaps: FloatArray, groups: Groups, others: Groups) -> FloatArray:
     """Return gaps of two sets of shapes with those of their groups in further rows and columns."""
-    whole = with_group_rows(with_group_rows(gaps, first).T, others).T
+    whole = with_group_rows(with_group_rows(gaps, groups).T, others).T
     return np.ascontiguousarray(whole)
 
 

@@ -20,7 +20,7 @@ from tcs.kernel.analytic.solver import is_outside
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.base_pose import pose_in_arm_base
 from tcs.kernel.cache import inner
-from tcs.kernel.contacts import NO_CONTACT, Workspace, gripper_body_contact
+from tcs.kernel.contacts import NO_CONTACT, gripper_body_contact
 from tcs.kernel.five_joints import pairs as five_joints
 from tcs.kernel.five_joints.pairs import FiveJointSolver, new_five_joint_solver
 from tcs.kernel.numeric import pairs as numeric
@@ -30,6 +30,7 @@ from tcs.kernel.scores import GRIPPER_BLOCKED_BY_ROBOT, REACHED, TOO_FAR
 from tcs.kernel.six_joints import pairs as six_joints
 from tcs.kernel.six_joints.pairs import SixJointSolver, new_six_joint_solver
 from tcs.kernel.views import tuple_class
+from tcs.kernel.workspace import Workspace
 
 Solver = Search | NumericSolver | SixJointSolver | FiveJointSolver
 

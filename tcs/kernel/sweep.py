@@ -11,12 +11,10 @@ from tcs.kernel.contacts import (
     BASE_FIXED,
     NO_CONTACT,
     TORSO_MOUNTED,
-    Workspace,
     base_contact,
     gripper_body_contact,
     gripper_contact_at,
     gripper_environment_contact,
-    new_workspace,
 )
 from tcs.kernel.dexterity.measures import measure_at, rounded_inward
 from tcs.kernel.freedom.forms import FEWEST_JOINTS, pose_of
@@ -32,6 +30,7 @@ from tcs.kernel.scores import (
 )
 from tcs.kernel.solvers import Solver, new_solver, out_of_reach, score_pair
 from tcs.kernel.views import unowned
+from tcs.kernel.workspace import Workspace, new_workspace
 
 
 def gripper_contacts(problem: Problem) -> IntArray:

@@ -7,11 +7,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from tcs.kernel.contacts import NO_CONTACT, new_workspace
+from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.problem import build_problem
 from tcs.kernel.scores import GRIPPER_BLOCKED_BY_ROBOT, REACHED
 from tcs.kernel.verification.constructed import random_posture, score_one, with_goals
 from tcs.kernel.verification.free_postures import posture_contact
+from tcs.kernel.workspace import new_workspace
 from tcs.model.scene import Scene, SceneSpec, lower
 from tcs.placement.scoring import sweep
 from tcs.placement.tables import Reason

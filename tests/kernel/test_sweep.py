@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tcs.kernel import groups
 from tcs.kernel.arrays import BOX, SPHERE, GridArrays
 from tcs.kernel.problem import build_problem
 from tcs.kernel.scores import (
@@ -32,6 +33,7 @@ from tcs.placement.tables import Reason
 from tests.kernel.judge import ROUNDING, chain_of, compare, is_true, stratified
 from tests.kernel.shapes import placed, rotation, straight_arm
 from tests.kernel.toy import (
+    crowded,
     goal_in_base,
     scores_of,
     size_of,
@@ -63,6 +65,22 @@ def test_the_kernel_agrees_with_the_reference_in_random_scenes(
     scene, grid = toy_scene(chain, seed, obstacles=seed % 14), toy_grid()
     scores = scores_of(scene, grid)
     compare(scene, grid, scores, stratified(np.random.default_rng(seed), scores.reason, number))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_clusters_of_a_body_with_many_shapes_change_no_score(lowered, seed, monkeypatch):
+    chain = chain_of(seed, lowered)
+    rng, grid = np.random.default_rng(seed), toy_grid()
+    scene = crowded(toy_scene(chain, seed, obstacles=4), rng, 30)
+    assert max(np.diff(build_problem(scene, grid).link_groups.clusters)) > 2
+    scores = scores_of(scene, grid)
+    compare(scene, grid, scores, stratified(rng, scores.reason, 1))
+    monkeypatch.setattr(groups, "CLUSTER", len(scene.body.type))
+    assert max(np.diff(build_problem(scene, grid).body_groups.clusters)) == 1
+    whole = scores_of(scene, grid)
+    for name in ("reason", "contact", "dexterity", "joints"):
+        np.testing.assert_array_equal(getattr(scores, name), getattr(whole, name))
+    assert len(np.unique(scores.reason)) > 4
 
 
 @pytest.mark.parametrize(
@@ -203,7 +221,7 @@ def test_slices_give_what_one_sweep_gives(lowered, seed):
     whole = scores_of(scene, grid)
     cuts = np.sort(rng.choice(np.arange(1, size_of(grid)), 12, replace=False)).tolist()
     parts = scores_of(scene, grid, cuts)
-    for name in ("reason", "dexterity", "joints"):
+    for name in ("reason", "contact", "dexterity", "joints"):
         np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name), err_msg=name)
     # Which of several contacts names a blocked arm is the one that was found first.
     named = whole.reason != ARM_BLOCKED

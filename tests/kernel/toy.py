@@ -142,6 +142,34 @@ def with_obstacle(scene, shape):
     )
 
 
+def crowded(scene, rng, number):
+    """Return a scene with so many small shapes in place of each shape of the robot, around it."""
+
+    def many(shapes):
+        rows = np.repeat(np.arange(len(shapes.type)), number)
+        types = rng.choice((SPHERE, CAPSULE, BOX), size=len(rows)).astype(np.int8)
+        out = rng.uniform(-1, 1, (len(rows), 3)) * np.array([0.12, 0.12, 0.2])
+        shapes = Shapes(
+            *(column[rows] for column in shapes[:5]), shapes.R[:, rows], shapes.p[:, rows]
+        )
+        return shapes._replace(
+            type=types,
+            size=rng.uniform(0.003, 0.03, (len(rows), 3)) * np.array([1.0, 2.0, 3.0]),
+            R=np.repeat([[rotation(rng) for _ in rows]], len(shapes.R), axis=0),
+            p=shapes.p + out,
+        ), rows
+
+    (arm, of_arm), (body, of_body) = many(scene.arm), many(scene.body)
+    return scene._replace(
+        arm=arm,
+        body=body,
+        arm_vs_arm=scene.arm_vs_arm[of_arm][:, of_arm],
+        arm_vs_body=scene.arm_vs_body[of_arm][:, of_body],
+        arm_vs_environment=scene.arm_vs_environment[of_arm],
+        body_vs_environment=scene.body_vs_environment[of_body],
+    )
+
+
 def size_of(grid):
     """Return the number of configurations."""
     places = len(grid.base_x) * len(grid.base_y) * len(grid.base_yaw)

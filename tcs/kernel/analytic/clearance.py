@@ -23,10 +23,11 @@ from tcs.kernel.analytic.scratch import (
 from tcs.kernel.arrays import BOX, CAPSULE, FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant
 from tcs.kernel.collide import CENTRE, ROTATION, SIZE, TYPE, closer, move
-from tcs.kernel.contacts import ARM, ENVIRONMENT, NO_CONTACT, Workspace, arm_contact, at_goal
+from tcs.kernel.contacts import ARM, ENVIRONMENT, NO_CONTACT, arm_contact, at_goal
 from tcs.kernel.distances import may_come_apart
 from tcs.kernel.kinematics import copy_joints, link_poses
 from tcs.kernel.problem import Problem
+from tcs.kernel.workspace import Workspace
 
 PATH = 1.25
 """Longest way of a shape from the nearer end of an interval, over half the distance of the ends: an

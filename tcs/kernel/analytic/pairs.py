@@ -23,11 +23,12 @@ from tcs.kernel.analytic.scratch import (
 from tcs.kernel.analytic.search import find_candidates, record_all
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, int_constant
-from tcs.kernel.contacts import NO_CONTACT, Workspace, arm_contact, at_goal
+from tcs.kernel.contacts import NO_CONTACT, arm_contact, at_goal
 from tcs.kernel.dexterity import ANY, ISOTROPY, UNLIMITED
 from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.problem import Problem
 from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED, TOO_FAR
+from tcs.kernel.workspace import Workspace
 
 NONE, NOTHING = int_constant(0), int_constant(-1)
 

@@ -12,7 +12,6 @@ from tcs.kernel.approach.grid import PIECES, LineGrid
 from tcs.kernel.approach.turns import place_sample
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant
-from tcs.kernel.contacts import Workspace
 from tcs.kernel.motion.edges import curve_is_free
 from tcs.kernel.motion.pairs import is_near, take_turned_posture
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
@@ -28,6 +27,7 @@ from tcs.kernel.motion.straight import (
 )
 from tcs.kernel.motion.tool_line import take_line
 from tcs.kernel.numeric.newton import factorise, step_to_goal
+from tcs.kernel.workspace import Workspace
 
 FIRST = int_constant(0)
 FEWEST, MOST = 2, 16

@@ -16,7 +16,7 @@ from tcs.kernel.analytic.samples import MAX_SAMPLES
 from tcs.kernel.analytic.solver import ArmSolver
 from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant
-from tcs.kernel.contacts import Workspace
+from tcs.kernel.workspace import Workspace
 
 PIECES = 4
 """Number of pieces of the line between levels."""

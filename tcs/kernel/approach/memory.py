@@ -11,9 +11,9 @@ from tcs.kernel.approach.curve import CurveWorkspace, new_curve
 from tcs.kernel.approach.grid import LineGrid, new_grid
 from tcs.kernel.approach.scene import LineScene
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.contacts import Workspace, new_workspace
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace, new_motion_workspace
 from tcs.kernel.problem import Problem
+from tcs.kernel.workspace import Workspace, new_workspace
 
 MOST_CURVES = 100
 """Greatest number of motions that are followed for a pair."""

@@ -13,7 +13,7 @@ import numpy as np
 from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
 from tcs.kernel.cache import inner
 from tcs.kernel.collide import CENTRE, COLUMNS
-from tcs.kernel.contacts import BASE_FIXED, Workspace
+from tcs.kernel.contacts import BASE_FIXED
 from tcs.kernel.motion.groups import grouped
 from tcs.kernel.motion.idle import needed_pairs
 from tcs.kernel.motion.scene import (
@@ -25,6 +25,7 @@ from tcs.kernel.motion.scene import (
     with_pairs,
 )
 from tcs.kernel.problem import Problem
+from tcs.kernel.workspace import Workspace
 
 AWAY = 1e3
 """Coordinate of shapes beyond the arm's reach, which are not placed [m]."""

@@ -12,7 +12,6 @@ from tcs.kernel.base_pose import pose_in_arm_base
 from tcs.kernel.cache import inner, jit
 from tcs.kernel.contacts import (
     NO_CONTACT,
-    Workspace,
     arm_contact,
     at_goal,
     gripper_body_contact,
@@ -33,6 +32,7 @@ from tcs.kernel.scores import (
 )
 from tcs.kernel.six_joints.arm import SixJointArm
 from tcs.kernel.six_joints.solutions import MOST_SOLUTIONS, solve_six_joints, within_limits
+from tcs.kernel.workspace import Workspace
 
 TRIED = -1.0
 """Measure of a solution that is in contact."""

@@ -9,7 +9,7 @@ import numpy as np
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.base_pose import pose_in_arm_base
 from tcs.kernel.cache import inner
-from tcs.kernel.contacts import NO_CONTACT, Workspace, gripper_contact_at
+from tcs.kernel.contacts import NO_CONTACT, gripper_contact_at
 from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.freedom.cap import cap_cosine, cap_pose, norm
 from tcs.kernel.freedom.forms import FEWEST_JOINTS, HALF, PARAMETERS, TILT, pose_of
@@ -25,6 +25,7 @@ from tcs.kernel.scores import (
     TOO_FAR,
 )
 from tcs.kernel.solvers import THOROUGH, Solver, score_pose
+from tcs.kernel.workspace import Workspace
 
 ROUNDS = 5
 """Number of refinement rounds; each halves the distance of the poses tried from the best one."""

@@ -8,13 +8,7 @@ from __future__ import annotations
 from tcs.kernel.analytic.scratch import best_of
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, int_constant
-from tcs.kernel.contacts import (
-    NO_CONTACT,
-    Workspace,
-    arm_contact,
-    at_goal,
-    pair_touches,
-)
+from tcs.kernel.contacts import NO_CONTACT, arm_contact, at_goal, pair_touches
 from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.kinematics import copy_joints, link_poses
 from tcs.kernel.numeric.arm import NumericArm
@@ -31,6 +25,7 @@ from tcs.kernel.numeric.search import (
 )
 from tcs.kernel.problem import Problem
 from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED, TOO_FAR
+from tcs.kernel.workspace import Workspace
 
 EXACT = 1e-9
 """Error of a solution [rad and m], far below the 1e-7 that forward kinematics must confirm."""

@@ -8,13 +8,14 @@ import numpy as np
 
 from tcs.kernel.arrays import Chain, FloatArray, IntArray
 from tcs.kernel.cache import inner
-from tcs.kernel.contacts import NO_CONTACT, Workspace, arm_contact, at_goal
+from tcs.kernel.contacts import NO_CONTACT, arm_contact, at_goal
 from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.kinematics import copy_joints
 from tcs.kernel.problem import Problem
 from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED, TOO_FAR
 from tcs.kernel.six_joints.arm import SixJointArm, six_joint_arm
 from tcs.kernel.six_joints.solutions import MOST_SOLUTIONS, solve_six_joints, within_limits
+from tcs.kernel.workspace import Workspace
 
 TRIED = -1.0
 """Measure of a solution that is in contact."""

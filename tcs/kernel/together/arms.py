@@ -11,12 +11,10 @@ from tcs.kernel.cache import inner, jit
 from tcs.kernel.collide import closer, move, spheres_overlap
 from tcs.kernel.contacts import (
     NO_CONTACT,
-    Workspace,
     arm_contact,
     at_goal,
     gripper_body_contact,
     gripper_contact_at,
-    new_workspace,
     place_coupled_links,
 )
 from tcs.kernel.dexterity.measures import measure_at, rounded_inward
@@ -28,6 +26,7 @@ from tcs.kernel.problem import Problem, gaps_between
 from tcs.kernel.six_joints.pairs import new_six_joint_solver
 from tcs.kernel.six_joints.solutions import MOST_SOLUTIONS, solve_six_joints, within_limits
 from tcs.kernel.views import unowned
+from tcs.kernel.workspace import Workspace, new_workspace
 
 SAMPLES_OF_FREE_GOALS = 8
 """Least number of values of the free joint at each sampled pose of a goal with freedom, which has
@@ -55,7 +54,7 @@ class TwoArms:
             )
         self.problems = (first, second)
         self.works = (new_workspace(first), new_workspace(second))
-        self.gaps = gaps_between(*scenes, first.link_first, second.link_first)
+        self.gaps = gaps_between(*scenes, first.link_groups, second.link_groups)
 
     def contacts(self, torsos: IntArray, first: FloatArray, second: FloatArray) -> IntArray:
         """Return the bodies of the two arms that touch, of several pairs of postures.
@@ -349,7 +348,8 @@ def _arms_touch(
     rows: IntArray,
 ) -> bool:
     """Return whether two arms with their shapes in one frame touch; fills `rows`."""
-    first, second = a.link_first, b.link_first
+    groups, other_groups = a.link_groups, b.link_groups
+    first, second = groups.first, other_groups.first
     for g in range(len(first) - 1):
         box = first[-1] + g
         for h in range(len(second) - 1):
@@ -358,7 +358,7 @@ def _arms_touch(
             if (
                 spheres_overlap(shapes, box, others, other, gap)
                 and closer(shapes, box, others, other, gap)
-                and groups_touch(shapes, first, g, others, second, h, gaps, rows)
+                and groups_touch(shapes, groups, g, others, other_groups, h, gaps, rows)
             ):
                 return True
     return False

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from tcs.kernel.arrays import BOX, CAPSULE, SPHERE, FloatArray, GridArrays, SceneArrays, Shapes
-from tcs.kernel.contacts import new_workspace
 from tcs.kernel.problem import build_problem
 from tcs.kernel.verification.free_postures import base_is_free
 from tcs.kernel.verification.reference import Pose, compose, rot_z
+from tcs.kernel.workspace import new_workspace
 
 CLUTTER = 10
 """Number of shapes added within an arm's length of the arm base."""

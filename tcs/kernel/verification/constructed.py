@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tcs.kernel.arrays import SPHERE, Chain, FloatArray, GridArrays, SceneArrays
-from tcs.kernel.contacts import NO_CONTACT, new_workspace
+from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.scores import Scores
 from tcs.kernel.sweep import gripper_contacts, score_slice
@@ -29,6 +29,7 @@ from tcs.kernel.verification.reference import (
     shapes_of,
     solutions,
 )
+from tcs.kernel.workspace import new_workspace
 
 SHOULDER, ELBOW, WRIST = 1, 3, 5
 """Indices of the joints at some angles of which the arm is singular, or its closed form is."""

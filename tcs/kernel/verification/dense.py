@@ -13,20 +13,14 @@ from tcs.kernel.analytic.solver import ArmSolver, is_outside
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.base_pose import environment_in_arm_base, goal_in_arm_base, place_base
 from tcs.kernel.cache import inner, int_constant, jit
-from tcs.kernel.contacts import (
-    NO_CONTACT,
-    Workspace,
-    arm_contact,
-    at_goal,
-    gripper_body_contact,
-    new_workspace,
-)
+from tcs.kernel.contacts import NO_CONTACT, arm_contact, at_goal, gripper_body_contact
 from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.problem import Problem
 from tcs.kernel.verification.free_scans import free_scans
 from tcs.kernel.verification.numeric_dense import STARTS, numeric_dense_scans
 from tcs.kernel.verification.six_joint_scans import six_joint_scans
 from tcs.kernel.views import unowned
+from tcs.kernel.workspace import Workspace, new_workspace
 
 COARSE = 0.005
 """Motion of any joint between two samples [rad] above which the dense scan adds samples."""

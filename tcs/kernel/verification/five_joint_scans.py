@@ -7,12 +7,12 @@ import numpy as np
 from tcs.kernel.arrays import Chain, FloatArray
 from tcs.kernel.base_pose import goal_in_arm_base, place_base
 from tcs.kernel.cache import jit
-from tcs.kernel.contacts import Workspace, new_workspace
 from tcs.kernel.five_joints.turned import turned_chain
 from tcs.kernel.problem import Problem
 from tcs.kernel.together.arms import keep_free, measures_of, place_gripper_pose
 from tcs.kernel.verification.newton_solutions import newton_solutions, within
 from tcs.kernel.views import unowned
+from tcs.kernel.workspace import Workspace, new_workspace
 
 
 def five_joint_scan(problem: Problem, configuration: int, goal: int, joints: FloatArray) -> float:

@@ -9,7 +9,6 @@ from tcs.kernel.contacts import (
     BASE_FIXED,
     NO_CONTACT,
     TORSO_MOUNTED,
-    Workspace,
     arm_contact,
     base_contact,
     gripper_body_contact,
@@ -17,6 +16,7 @@ from tcs.kernel.contacts import (
 )
 from tcs.kernel.problem import Problem
 from tcs.kernel.views import unowned
+from tcs.kernel.workspace import Workspace
 
 
 @jit

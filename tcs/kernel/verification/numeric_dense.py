@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.base_pose import environment_in_arm_base, goal_in_arm_base, place_base
 from tcs.kernel.cache import int_constant, jit
-from tcs.kernel.contacts import NO_CONTACT, Workspace, gripper_body_contact, new_workspace
+from tcs.kernel.contacts import NO_CONTACT, gripper_body_contact
 from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.low_discrepancy import spread
 from tcs.kernel.numeric.arm import NumericArm, joint_ranges, numeric_arm_of
@@ -16,6 +16,7 @@ from tcs.kernel.numeric.pairs import NOWHERE, bisect_contacts, choose
 from tcs.kernel.numeric.search import CurveSearch, find_candidates, new_curve_search, trace_from
 from tcs.kernel.problem import Problem
 from tcs.kernel.views import unowned
+from tcs.kernel.workspace import Workspace, new_workspace
 
 STARTS = 400
 """Number of starts."""

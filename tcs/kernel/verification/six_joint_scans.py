@@ -8,18 +8,12 @@ from numpy.typing import NDArray
 from tcs.kernel.arrays import Chain, FloatArray, IntArray
 from tcs.kernel.base_pose import environment_in_arm_base, goal_in_arm_base, place_base
 from tcs.kernel.cache import jit
-from tcs.kernel.contacts import (
-    NO_CONTACT,
-    Workspace,
-    arm_contact,
-    at_goal,
-    gripper_body_contact,
-    new_workspace,
-)
+from tcs.kernel.contacts import NO_CONTACT, arm_contact, at_goal, gripper_body_contact
 from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.problem import Problem
 from tcs.kernel.verification.newton_solutions import newton_solutions, within
 from tcs.kernel.views import unowned
+from tcs.kernel.workspace import Workspace, new_workspace
 
 
 def six_joint_scans(problem: Problem, pairs: IntArray, joints: FloatArray) -> NDArray[np.float64]:

@@ -29,7 +29,7 @@ class PersonProblems:
         order = arm_order(arrays)
         self._pads = arrays.arm.pad[order], arrays.body.pad
         self._checked = arrays.arm_vs_environment[order], arrays.body_vs_environment
-        self._first = problem.link_first, problem.body_first
+        self._groups = problem.link_groups, problem.body_groups
         self._margin = arrays.margin
 
     def of(self, arrays: SceneArrays) -> Problem:
@@ -56,4 +56,4 @@ class PersonProblems:
         """Return the distances that arm (0) or body (1) keep from the environment [m]."""
         required = np.maximum(max(self._margin, TOUCH), self._pads[group][:, None] + pad)
         gaps = np.where(self._checked[group], required, UNCHECKED)
-        return with_group_rows(np.ascontiguousarray(gaps), self._first[group])
+        return with_group_rows(np.ascontiguousarray(gaps), self._groups[group])

@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tcs.kernel.contacts import NO_CONTACT, new_workspace
+from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.motion.edges import NO_PAIR
 from tcs.kernel.motion.edges import posture_contact as motion_contact
 from tcs.kernel.motion.scene import motion_scene, new_motion_workspace
 from tcs.kernel.problem import build_problem
 from tcs.kernel.verification.constructed import with_goals
 from tcs.kernel.verification.free_postures import posture_contact
+from tcs.kernel.workspace import new_workspace
 from tcs.model.robots import load_robot
 from tcs.model.robots.distances import tables_in_force
 from tcs.model.scene import Scene, SceneSpec, lower
