@@ -11,10 +11,10 @@ from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
 from tcs.motion.curves import Curve
 from tcs.motion.stops import Stop
 
-ITERATIONS = 20_000
-"""Greatest number of random postures that the planner grows towards. Of the PR2's goals that a path
-leads to, one in a hundred takes more than a tenth of these: goals of a single posture beside the
-person's arm."""
+ITERATIONS = 40_000
+"""Greatest number of random postures that the planner grows towards. Of 1,390 ways from rest to a
+goal of the PR2's shaving in the wheelchair that were found at all, three are not found each time
+with half of these, and one with all."""
 SHORTCUTS = 20
 """Greatest number of random shortcuts that are tried, as long as not too many are blocked."""
 WIDEST_CORNER = 0.3
