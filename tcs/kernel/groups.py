@@ -110,8 +110,10 @@ def with_group_rows(gaps: FloatArray, groups: Groups) -> FloatArray:
     Returns:
         Shape (n + boxes, m).
     """
-    greatest = [gaps[inside].max(axis=0, keepdims=True) for inside in groups.in_boxes()]
-    return np.ascontiguousarray(np.concatenate([gaps, *greatest]))
+    of_groups = np.maximum.reduceat(gaps, groups.first[:-1])
+    of_clusters = np.maximum.reduceat(gaps[groups.members], groups.cluster_first[:-1])
+    own = groups.cluster_box >= len(gaps) + len(of_groups)
+    return np.ascontiguousarray(np.concatenate([gaps, of_groups, of_clusters[own]]))
 
 
 def _first_rows(*keys: NDArray[Any]) -> IntArray:
@@ -144,18 +146,19 @@ def _box_around(rows: FloatArray) -> FloatArray:
     p = rows[..., CENTRE : CENTRE + 3]
     half = _core(rows[0])
     radius = np.where(rows[0, :, TYPE] == BOX, 0.0, rows[0, :, SIZE])
-    # Of the boxes around all shapes n with each orientation k among theirs.
+    # Of the boxes around all shapes n with each orientation k among theirs; rows are (k, axis).
     of = list({R_k.tobytes(): k for k, R_k in enumerate(R[0])}.values())
-    along = np.abs(np.einsum("kri,nrj->knij", R[0, of], R[0]))
-    spread = np.einsum("knij,nj->kni", along, half) + radius[:, None]
-    middle = np.einsum("knr,kri->kni", p[0] - p[0, of, None], R[0, of])
-    low, high = (middle - spread).min(axis=1), (middle + spread).max(axis=1)
+    axes = np.swapaxes(R[0, of], 1, 2).reshape(-1, 3)
+    spread = radius + sum(np.abs(axes @ R[0, :, :, j].T) * half[:, j] for j in range(3))
+    middle = axes @ (p[0] - p[0, 0]).T
+    low = (middle - spread).min(axis=1).reshape(-1, 3)
+    high = (middle + spread).max(axis=1).reshape(-1, 3)
     sizes = (high - low) / 2 + ROUNDING
     k = int(np.argmin(sizes.prod(axis=1)))
     best = np.empty((len(rows), COLUMNS))
     best[:, TYPE], best[:, SIZE : SIZE + 3] = BOX, sizes[k]
     best[:, BOUND] = np.linalg.norm(sizes[k])
-    best[:, CENTRE : CENTRE + 3] = p[:, of[k]] + R[:, of[k]] @ ((low[k] + high[k]) / 2)
+    best[:, CENTRE : CENTRE + 3] = p[:, 0] + R[:, of[k]] @ ((low[k] + high[k]) / 2)
     best[:, ROTATION:] = R[:, of[k]].reshape(-1, 9)
     return best
 
