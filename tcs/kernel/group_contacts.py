@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner
-from tcs.kernel.collide import closer, spheres_overlap
+from tcs.kernel.collide import closer, sphere_is_near, spheres_overlap
 from tcs.kernel.groups import Groups
 
 
@@ -24,7 +24,12 @@ def group_touches(
 ) -> bool:
     """Return whether group g of a, with its shapes in place, touches shape j of b."""
     box = groups.first[-1] + g
-    return closer(a, box, b, j, gaps[box, j]) and _shapes_touch(a, groups, g, b, j, gaps, touching)
+    gap = gaps[box, j]
+    return (
+        sphere_is_near(a, box, b, j, gap)
+        and closer(a, box, b, j, gap)
+        and _shapes_touch(a, groups, g, b, j, gaps, touching)
+    )
 
 
 @inner
@@ -73,6 +78,44 @@ def groups_touch(
                 ):
                     return True
     return False
+
+
+@inner
+def first_touching(
+    a: FloatArray,
+    i: int,
+    b: FloatArray,
+    groups: Groups,
+    h: int,
+    gaps: FloatArray,
+    touching: IntArray,
+) -> bool:
+    """Return whether shape i of a touches group h of b; fills `touching` with the first it touches.
+
+    The shape touches the box around the group.
+    """
+    box, least, members = groups.first[-1] + h, groups.first[h + 1], groups.members
+    for d in range(groups.clusters[h], groups.clusters[h + 1]):
+        part, start = groups.cluster_box[d], groups.cluster_first[d]
+        if members[start] >= least:
+            continue
+        gap = gaps[i, part]
+        if part != box and not (
+            gap > 0.0 and spheres_overlap(a, i, b, part, gap) and closer(a, i, b, part, gap)
+        ):
+            continue
+        for n in range(start, groups.cluster_first[d + 1]):
+            j = members[n]
+            if j >= least:
+                break
+            gap = gaps[i, j]
+            if gap > 0.0 and spheres_overlap(a, i, b, j, gap) and closer(a, i, b, j, gap):
+                least = j
+                break
+    if least == groups.first[h + 1]:
+        return False
+    touching[0], touching[1] = i, least
+    return True
 
 
 @inner

@@ -14,11 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.kernel.arrays import BOX, CAPSULE, FloatArray, IntArray
-from tcs.kernel.collide import BOUND, CENTRE, COLUMNS, ROTATION, SIZE, TYPE
-
-ROUNDING = 1e-9
-"""Growth of a box around shapes [m], so that rounding never leaves a shape outside."""
-
+from tcs.kernel.collide import BOUND, CENTRE, COLUMNS, ROTATION, ROUNDING, SIZE, TYPE
 
 CLUSTER = 12
 """Greatest number of shapes of a cluster. Counted on Baxter, 10 to 12 make for the fewest tests."""

@@ -21,7 +21,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from scipy.optimize import lsq_linear
 
 from tcs.kernel.arrays import BOX, CAPSULE, SPHERE
-from tcs.kernel.collide import closer, move, pack, spheres_overlap
+from tcs.kernel.collide import closer, move, pack, sphere_is_near, spheres_overlap
 from tcs.kernel.verification.reference import distance
 from tests.kernel.shapes import (
     SHAPE_TYPES,
@@ -182,6 +182,21 @@ def test_bounding_spheres_contain_their_shapes(first, second, rng):
         for gap in (1e-3, 0.05, gap_between(a, b) + 1e-9):
             if closer(A, 0, B, 0, gap):
                 assert spheres_overlap(A, 0, B, 0, gap)
+                assert sphere_is_near(A, 0, B, 0, gap)
+                assert sphere_is_near(B, 0, A, 0, gap)
+
+
+@pytest.mark.parametrize("second", SHAPE_TYPES)
+def test_a_sphere_is_near_a_shape_where_it_is_closer(second, rng):
+    apart = 0
+    for _ in range(100):
+        a, b = near_pair(rng, "sphere", second)
+        exact = distance(a, b)
+        assert sphere_is_near(row(a), 0, row(b), 0, max(exact, 1e-9))
+        if exact > 1e-6:
+            apart += 1
+            assert not sphere_is_near(row(a), 0, row(b), 0, exact - 1e-8)
+    assert apart > 20
 
 
 @pytest.mark.parametrize("first", SHAPE_TYPES)
