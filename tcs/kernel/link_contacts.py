@@ -54,18 +54,18 @@ def _link_touches_shape(
     # The box of a single shape is the shape, and touches.
     if end - first == 1:
         return True
-    box, least, seen = groups.first[-1] + g, end, _seen_from(problem, work, g, b, j)
+    box, least, seen = groups.first[-1] + g, end, _seen_from(problem, work, g, b, j, gaps)
     for c in range(groups.clusters[g], groups.clusters[g + 1]):
         part, start = groups.cluster_box[c], groups.cluster_first[c]
         if groups.members[start] >= least:
             continue
-        if part != box and not _row_touches(problem, work, part, seen, b, j, gaps[part, j]):
+        if part != box and not _row_touches(problem, work, part, seen, b, j, gaps):
             continue
         for n in range(start, groups.cluster_first[c + 1]):
             i = groups.members[n]
             if i >= least:
                 break
-            if _row_touches(problem, work, i, seen, b, j, gaps[i, j]):
+            if _row_touches(problem, work, i, seen, b, j, gaps):
                 least = i
                 break
     if least == end:
@@ -92,20 +92,18 @@ def _link_touches_group(
         return _link_touches_shape(problem, work, g, b, others.first[h], gaps)
     groups = problem.link_groups
     box, other, least = groups.first[-1] + g, others.first[-1] + h, groups.first[g + 1]
-    seen = _seen_from(problem, work, g, b, other)
+    seen = _seen_from(problem, work, g, b, other, gaps)
     for c in range(groups.clusters[g], groups.clusters[g + 1]):
         part, start = groups.cluster_box[c], groups.cluster_first[c]
         if groups.members[start] >= least:
             continue
-        gap = gaps[part, other]
-        if part != box and not _row_touches(problem, work, part, seen, b, other, gap):
+        if part != box and not _row_touches(problem, work, part, seen, b, other, gaps):
             continue
         for n in range(start, groups.cluster_first[c + 1]):
             i = groups.members[n]
             if i >= least:
                 break
-            gap = gaps[i, other]
-            if _row_touches(problem, work, i, seen, b, other, gap) and first_touching(
+            if _row_touches(problem, work, i, seen, b, other, gaps) and first_touching(
                 work.arm, i, b, others, h, gaps, work.touching
             ):
                 least = i
@@ -121,27 +119,29 @@ def _row_touches(
     seen: tuple[float, ...],
     b: FloatArray,
     j: int,
-    gap: float,
+    gaps: FloatArray,
 ) -> bool:
     """Return whether row i of the arm touches row j of b, as `seen` from its link.
 
-    Places row i where its bounding sphere is near.
+    Places row i where its bounding sphere is near. Its gap, which lies far from those of the other
+    rows in memory, is read only then.
     """
-    if gap <= 0.0 or not _is_near(problem.links, i, seen, gap):
+    if not _is_near(problem.links, i, seen) or gaps[i, j] <= 0.0:
         return False
     place_link(problem, work, i)
-    return closer(work.arm, i, b, j, gap)
+    return closer(work.arm, i, b, j, gaps[i, j])
 
 
 @inner
 def _seen_from(
-    problem: Problem, work: Workspace, g: int, b: FloatArray, j: int
+    problem: Problem, work: Workspace, g: int, b: FloatArray, j: int, gaps: FloatArray
 ) -> tuple[float, ...]:
     """Return how row j of b is seen from the link of group g.
 
     Returns:
         The rotation from the link's frame to that of the row, row by row; the origin of the link in
-        the frame of the row [m]; the half sizes of the row's core and the radius around it [m].
+        the frame of the row [m]; the half sizes of the row's core; and the radius around it that no
+        bounding sphere may enter, with the gap of the group [m].
     """
     frame = problem.link_frame[problem.link_groups.first[g]]
     R, p = work.link_R[frame], work.link_p[frame]
@@ -166,18 +166,18 @@ def _seen_from(
         hx,
         hy,
         hz,
-        radius,
+        radius + gaps[problem.link_groups.first[-1] + g, j] + ROUNDING,
     )
 
 
 @inner
-def _is_near(links: FloatArray, i: int, seen: tuple[float, ...], gap: float) -> bool:
-    """Return whether the bounding sphere of row i is within `gap` [m] of a row, as `seen`."""
+def _is_near(links: FloatArray, i: int, seen: tuple[float, ...]) -> bool:
+    """Return whether the bounding sphere of row i is within the gap of a row, as `seen`."""
     x, y, z = links[i, CENTRE], links[i, CENTRE + 1], links[i, CENTRE + 2]
     u = seen[0] * x + seen[1] * y + seen[2] * z + seen[9]
     v = seen[3] * x + seen[4] * y + seen[5] * z + seen[10]
     w = seen[6] * x + seen[7] * y + seen[8] * z + seen[11]
-    apart = links[i, BOUND] + seen[15] + gap + ROUNDING
+    apart = links[i, BOUND] + seen[15]
     return square_beyond(u, v, w, seen[12], seen[13], seen[14]) < apart * apart
 
 
