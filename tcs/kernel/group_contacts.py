@@ -9,13 +9,13 @@ from __future__ import annotations
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner
 from tcs.kernel.collide import closer, sphere_is_near, spheres_overlap
-from tcs.kernel.groups import Groups
+from tcs.kernel.groups import ShapeGroups
 
 
 @inner
 def group_touches(
     a: FloatArray,
-    groups: Groups,
+    groups: ShapeGroups,
     g: int,
     b: FloatArray,
     j: int,
@@ -35,10 +35,10 @@ def group_touches(
 @inner
 def groups_touch(
     a: FloatArray,
-    groups: Groups,
+    groups: ShapeGroups,
     g: int,
     b: FloatArray,
-    others: Groups,
+    others: ShapeGroups,
     h: int,
     gaps: FloatArray,
     touching: IntArray,
@@ -85,7 +85,7 @@ def first_touching(
     a: FloatArray,
     i: int,
     b: FloatArray,
-    groups: Groups,
+    groups: ShapeGroups,
     h: int,
     gaps: FloatArray,
     touching: IntArray,
@@ -123,7 +123,7 @@ def shape_touches_cluster(
     a: FloatArray,
     i: int,
     b: FloatArray,
-    groups: Groups,
+    groups: ShapeGroups,
     d: int,
     gaps: FloatArray,
     touching: IntArray,
@@ -141,7 +141,7 @@ def shape_touches_cluster(
 @inner
 def _shapes_touch(
     a: FloatArray,
-    groups: Groups,
+    groups: ShapeGroups,
     g: int,
     b: FloatArray,
     j: int,

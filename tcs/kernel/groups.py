@@ -20,7 +20,7 @@ CLUSTER = 12
 """Greatest number of shapes of a cluster. Counted on Baxter, 10 to 12 make for the fewest tests."""
 
 
-class Groups(NamedTuple):
+class ShapeGroups(NamedTuple):
     """Groups of packed shapes, and the clusters that make up each group.
 
     Further rows follow the n rows of shapes: the box around each group, then the boxes around the
@@ -46,7 +46,7 @@ class Groups(NamedTuple):
         return of_groups + list(itertools.compress(of_clusters, several))
 
 
-def groups_of(centres: FloatArray, *keys: NDArray[Any]) -> Groups:
+def groups_of(centres: FloatArray, *keys: NDArray[Any]) -> ShapeGroups:
     """Return the groups of runs of shapes with equal keys, and their clusters.
 
     A group is halved along the longest extent of the centres until clusters are left.
@@ -69,7 +69,7 @@ def groups_of(centres: FloatArray, *keys: NDArray[Any]) -> Groups:
             box += range(rows, rows + count)
             rows += count
     each = list(itertools.chain(*clusters))
-    return Groups(
+    return ShapeGroups(
         first=first,
         clusters=np.cumsum([0, *counts], dtype=np.int64),
         members=np.concatenate([np.empty(0, np.int64), *each]),
@@ -78,7 +78,7 @@ def groups_of(centres: FloatArray, *keys: NDArray[Any]) -> Groups:
     )
 
 
-def with_boxes(rows: FloatArray, groups: Groups) -> FloatArray:
+def with_boxes(rows: FloatArray, groups: ShapeGroups) -> FloatArray:
     """Return packed shapes, followed by the boxes around groups and clusters.
 
     Args:
@@ -96,7 +96,7 @@ def with_boxes(rows: FloatArray, groups: Groups) -> FloatArray:
     return np.ascontiguousarray(np.concatenate([rows, *around], axis=1))
 
 
-def with_group_rows(gaps: FloatArray, groups: Groups) -> FloatArray:
+def with_group_rows(gaps: FloatArray, groups: ShapeGroups) -> FloatArray:
     """Return gaps of pairs of shapes [m], followed by the greatest of those in each box.
 
     Args:

@@ -20,7 +20,7 @@ from tcs.kernel.collide import (
     square_beyond,
 )
 from tcs.kernel.group_contacts import first_touching
-from tcs.kernel.groups import Groups
+from tcs.kernel.groups import ShapeGroups
 from tcs.kernel.problem import Problem
 from tcs.kernel.workspace import Workspace, place_link, place_shapes
 
@@ -80,7 +80,7 @@ def _link_touches_group(
     work: Workspace,
     g: int,
     b: FloatArray,
-    others: Groups,
+    others: ShapeGroups,
     h: int,
     gaps: FloatArray,
 ) -> bool:

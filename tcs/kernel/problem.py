@@ -21,7 +21,7 @@ from tcs.kernel.collide import BOUND, CENTRE, pack
 from tcs.kernel.dexterity import DEFAULT_MEASURE, Dexterity, dexterity
 from tcs.kernel.distances import DistanceTables, arranged
 from tcs.kernel.freedom.goals import FreeGoals, axis_left_free, free_goals
-from tcs.kernel.groups import Groups, groups_of, with_boxes, with_group_rows
+from tcs.kernel.groups import ShapeGroups, groups_of, with_boxes, with_group_rows
 
 UNCHECKED = -1.0
 """Gap of a pair of shapes that is not checked."""
@@ -32,8 +32,8 @@ TOUCH = 1e-9
 class Problem(NamedTuple):
     """One scene, its goals and its grid.
 
-    The robot's shapes are grouped by body: the rows of shapes are followed by those of `Groups`. A
-    gap of a box is the greatest gap of its shapes.
+    The robot's shapes are grouped by body: the rows of shapes are followed by those of
+    `ShapeGroups`. A gap of a box is the greatest gap of its shapes.
     """
 
     measure: Dexterity
@@ -59,8 +59,8 @@ class Problem(NamedTuple):
     (arm rows,)."""
     link_body: IntArray
     """Robot body of each shape in `links`, shape (n_arm,)."""
-    link_groups: Groups
-    """Groups of `links`."""
+    link_groups: ShapeGroups
+    """ShapeGroups of `links`."""
     gripper_groups: int
     """Number of groups of the gripper, on link 7: the first ones."""
     base_R: FloatArray
@@ -72,8 +72,8 @@ class Problem(NamedTuple):
     (torso levels, body rows, 17)."""
     body_A: FloatArray
     """The rows of `body`, in A."""
-    body_groups: Groups
-    """Groups of `body`."""
+    body_groups: ShapeGroups
+    """ShapeGroups of `body`."""
     body_spheres: FloatArray
     """Centre and radius of the bounding spheres of the body shapes fixed to the base (0) and
     mounted on the torso (1), in B [m], shape (torso levels, 2, 4)."""
@@ -219,7 +219,7 @@ def with_environment(problem: Problem, scene: SceneArrays) -> Problem:
 
 
 def gaps_between(
-    first: SceneArrays, second: SceneArrays, groups: Groups, other_groups: Groups
+    first: SceneArrays, second: SceneArrays, groups: ShapeGroups, other_groups: ShapeGroups
 ) -> FloatArray:
     """Return the distances that the shapes of two arms of one robot must keep [m].
 
@@ -300,7 +300,7 @@ def _own(array: FloatArray) -> FloatArray:
     return np.array(array, dtype=np.float64, order="C")
 
 
-def _with_groups(gaps: FloatArray, groups: Groups, others: Groups) -> FloatArray:
+def _with_groups(gaps: FloatArray, groups: ShapeGroups, others: ShapeGroups) -> FloatArray:
     """Return gaps of two sets of shapes with those of their groups in further rows and columns."""
     whole = with_group_rows(with_group_rows(gaps, groups).T, others).T
     return np.ascontiguousarray(whole)
