@@ -60,7 +60,7 @@ class Problem(NamedTuple):
     link_body: IntArray
     """Robot body of each shape in `links`, shape (n_arm,)."""
     link_groups: ShapeGroups
-    """ShapeGroups of `links`."""
+    """Groups of the shapes in `links`."""
     gripper_groups: int
     """Number of groups of the gripper, on link 7: the first ones."""
     base_R: FloatArray
@@ -73,7 +73,7 @@ class Problem(NamedTuple):
     body_A: FloatArray
     """The rows of `body`, in A."""
     body_groups: ShapeGroups
-    """ShapeGroups of `body`."""
+    """Groups of the shapes in `body`."""
     body_spheres: FloatArray
     """Centre and radius of the bounding spheres of the body shapes fixed to the base (0) and
     mounted on the torso (1), in B [m], shape (torso levels, 2, 4)."""
