@@ -29,7 +29,7 @@ from tcs.kernel.arrays import BOX, SceneArrays, Shapes
 from tcs.kernel.motion.connect import connect
 from tcs.kernel.motion.edges import NO_PAIR, posture_contact
 from tcs.kernel.motion.groups import grouped
-from tcs.kernel.motion.idle import list_needed
+from tcs.kernel.motion.idle import needed_pairs
 from tcs.kernel.motion.random import random_state
 from tcs.kernel.motion.scene import (
     MotionScene,
@@ -139,8 +139,7 @@ class Bench:
         own = scene.body[scene.pair[:, 1]] >= len(problem.obstacles)
         needed = np.ones(len(scene.pair), np.bool_)
         if self.needed is None:
-            list_needed(scene, new_motion_workspace(scene), needed)
-            self.needed = needed[own]
+            self.needed = needed_pairs(scene, own)[own]
         needed[own] = self.needed
         return Query(problem, grouped(with_pairs(scene, needed)), self.trees)
 

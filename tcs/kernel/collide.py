@@ -11,6 +11,8 @@ import numpy as np
 from tcs.kernel.arrays import BOX, CAPSULE, FloatArray, IntArray, Shapes
 from tcs.kernel.cache import inner, jit
 
+Vector = tuple[float, float, float]
+
 PARALLEL = 1e-12
 """Squared sine below which two edges are parallel, so that their cross product gives no axis."""
 ROUNDING = 1e-9
@@ -321,7 +323,7 @@ def _boxes_closer(a: FloatArray, i: int, b: FloatArray, j: int, gap: float) -> b
         return False
     if most <= 0.0:
         return True
-    return min(_edges_box(a, i, b, j), _edges_box(b, j, a, i)) < gap * gap
+    return _an_edge_is_closer(a, i, b, j, gap) or _an_edge_is_closer(b, j, a, i, gap)
 
 
 @inner
@@ -343,27 +345,67 @@ def _edge_gap(
 
 
 @inner
-def _edges_box(a: FloatArray, i: int, b: FloatArray, j: int) -> float:
-    """Return the least squared distance from the 12 edges of box i to box j [m^2]."""
-    c = np.empty(3)
-    e = np.empty((3, 3))
-    for k in range(3):
-        c[k] = 0.0
-        for m in range(3):
-            c[k] += b[j, ROTATION + 3 * m + k] * (a[i, CENTRE + m] - b[j, CENTRE + m])
-        for m in range(3):
-            e[m, k] = 0.0
-            for n in range(3):
-                e[m, k] += b[j, ROTATION + 3 * n + k] * a[i, ROTATION + 3 * n + m] * a[i, SIZE + m]
-    least = np.inf
-    hx, hy, hz = b[j, SIZE], b[j, SIZE + 1], b[j, SIZE + 2]
-    for m in range(3):
-        f, g = (m + 1) % 3, (m + 2) % 3
-        for sign_f in (-1.0, 1.0):
-            for sign_g in (-1.0, 1.0):
-                px = c[0] + sign_f * e[f, 0] + sign_g * e[g, 0] - e[m, 0]
-                py = c[1] + sign_f * e[f, 1] + sign_g * e[g, 1] - e[m, 1]
-                pz = c[2] + sign_f * e[f, 2] + sign_g * e[g, 2] - e[m, 2]
-                x, y, z = _line_box(px, py, pz, 2 * e[m, 0], 2 * e[m, 1], 2 * e[m, 2], hx, hy, hz)
-                least = min(least, x * x + y * y + z * z)
-    return least
+def _an_edge_is_closer(a: FloatArray, i: int, b: FloatArray, j: int, gap: float) -> bool:
+    """Return whether one of the 12 edges of box i is closer than `gap` [m] to box j."""
+    centre = _in_frame(
+        b, j,
+        a[i, CENTRE] - b[j, CENTRE],
+        a[i, CENTRE + 1] - b[j, CENTRE + 1],
+        a[i, CENTRE + 2] - b[j, CENTRE + 2],
+    )  # fmt: skip
+    u, v, w = _half_edge(a, i, b, j, 0), _half_edge(a, i, b, j, 1), _half_edge(a, i, b, j, 2)
+    half = b[j, SIZE], b[j, SIZE + 1], b[j, SIZE + 2]
+    square = gap * gap
+    return (
+        _a_parallel_edge_is_closer(centre, u, v, w, half, square)
+        or _a_parallel_edge_is_closer(centre, v, w, u, half, square)
+        or _a_parallel_edge_is_closer(centre, w, u, v, half, square)
+    )
+
+
+@inner
+def _in_frame(b: FloatArray, j: int, x: float, y: float, z: float) -> Vector:
+    """Return a vector in the frame of shape j."""
+    return (
+        b[j, ROTATION] * x + b[j, ROTATION + 3] * y + b[j, ROTATION + 6] * z,
+        b[j, ROTATION + 1] * x + b[j, ROTATION + 4] * y + b[j, ROTATION + 7] * z,
+        b[j, ROTATION + 2] * x + b[j, ROTATION + 5] * y + b[j, ROTATION + 8] * z,
+    )
+
+
+@inner
+def _half_edge(a: FloatArray, i: int, b: FloatArray, j: int, m: int) -> Vector:
+    """Return half of an edge of box i along its axis m, in the frame of shape j [m]."""
+    size, at = a[i, SIZE + m], ROTATION + m
+    return _in_frame(b, j, size * a[i, at], size * a[i, at + 3], size * a[i, at + 6])
+
+
+@inner
+def _a_parallel_edge_is_closer(
+    centre: Vector, along: Vector, second: Vector, third: Vector, half: Vector, square: float
+) -> bool:
+    """Return whether one of four parallel edges of a box is closer to another box than a distance.
+
+    Args:
+        centre: Centre of the box, in the frame of the other one [m].
+        along: Half of these edges.
+        second: Half of an edge of another direction.
+        third: Half of an edge of the third direction.
+        half: Half sizes of the other box [m].
+        square: Square of the distance [m^2].
+    """
+    dx, dy, dz = along
+    hx, hy, hz = half
+    # Of most edges, one coordinate alone is far enough from the box.
+    ex, ey, ez = hx + abs(dx), hy + abs(dy), hz + abs(dz)
+    for n in range(4):
+        f, g = 1.0 - 2.0 * (n & 1), 1.0 - (n & 2)
+        x = centre[0] + f * second[0] + g * third[0]
+        y = centre[1] + f * second[1] + g * third[1]
+        z = centre[2] + f * second[2] + g * third[2]
+        if square_beyond(x, y, z, ex, ey, ez) >= square:
+            continue
+        x, y, z = _line_box(x - dx, y - dy, z - dz, 2.0 * dx, 2.0 * dy, 2.0 * dz, hx, hy, hz)
+        if x * x + y * y + z * z < square:
+            return True
+    return False

@@ -140,7 +140,8 @@ class StopGrid:
         Pairs of the robot's own shapes that never touch are left out.
         """
         every, robot = torso_scene(self.problem, torso), self.problem.environment_bodies
-        kept, other = needed_pairs(every, robot), every.body[every.pair[:, 1]]
+        other = every.body[every.pair[:, 1]]
+        kept = needed_pairs(every, other >= robot)
         of_fixed = carriers(self.problem)
         paths = grouped(with_pairs(every, kept), of_fixed)
         if not self.job.task.keep_out:

@@ -54,15 +54,14 @@ def approach_scene(problem: Problem) -> LineScene:
     Pairs of the robot's own shapes that touch at no torso level are left out.
     """
     first = torso_scene(problem, 0)
-    needed = needed_pairs(first, problem.environment_bodies)
+    needed = needed_pairs(first, first.body[first.pair[:, 1]] >= problem.environment_bodies)
     apart = _is_apart_from_torso(problem, first)
     for torso in range(1, problem.torso_levels):
         left = ~needed & apart
         if np.any(left):
             fixed = first.fixed.copy()
             fixed[problem.environment_body.size :] = problem.body_A[torso, : len(problem.body_body)]
-            scene = with_pairs(first._replace(fixed=fixed), left)
-            needed[left] = needed_pairs(scene, problem.environment_bodies)
+            needed |= left & needed_pairs(first._replace(fixed=fixed), left)
     scene = grouped(with_pairs(first, needed), carriers(problem))
     of_robot = np.concatenate(
         [problem.body_A[:, : len(problem.body_body)], _boxes(problem, scene)], axis=1

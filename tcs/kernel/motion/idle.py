@@ -24,29 +24,25 @@ MOST_BETWEEN = 2
 
 def without_idle_pairs(scene: MotionScene) -> MotionScene:
     """Return a scene, one without groups, without the pairs that never touch."""
-    needed = np.ones(len(scene.pair), np.bool_)
-    list_needed(scene, new_motion_workspace(scene), needed)
-    return with_pairs(scene, needed)
+    return with_pairs(scene, needed_pairs(scene, np.ones(len(scene.pair), np.bool_)))
 
 
-def needed_pairs(scene: MotionScene, robot: int) -> BoolArray:
-    """Return which pairs are needed, shape (n_pairs,): all but idle ones of the robot's own shapes.
+def needed_pairs(scene: MotionScene, checked: BoolArray) -> BoolArray:
+    """Return which pairs are needed, shape (n_pairs,): all but idle ones of those `checked`.
 
     Args:
         scene: A scene without groups.
-        robot: Number of the first body of the robot in `scene.body`.
+        checked: Which pairs may be left out, shape (n_pairs,).
     """
-    own = scene.body[scene.pair[:, 1]] >= robot
-    among = with_pairs(scene, own)
-    needed = np.ones(len(among.pair), np.bool_)
-    list_needed(among, new_motion_workspace(among), needed)
-    every = np.ones(len(scene.pair), np.bool_)
-    every[own] = needed
-    return every
+    needed = np.empty(len(scene.pair), np.bool_)
+    list_needed(scene, new_motion_workspace(scene), checked, needed)
+    return needed
 
 
 @jit
-def list_needed(owned_scene: MotionScene, owned_work: MotionWorkspace, needed: BoolArray) -> None:
+def list_needed(
+    owned_scene: MotionScene, owned_work: MotionWorkspace, checked: BoolArray, needed: BoolArray
+) -> None:
     """Fill which pairs can touch as far as the joints between their shapes decide.
 
     If there are one or two, a pair that is certified over their whole ranges never touches.
@@ -54,6 +50,7 @@ def list_needed(owned_scene: MotionScene, owned_work: MotionWorkspace, needed: B
     Args:
         owned_scene: The scene.
         owned_work: Scratch.
+        checked: Which pairs to check; the others are needed; shape (n_pairs,).
         needed: Filled, shape (n_pairs,).
     """
     scene, work = unowned(owned_scene), unowned(owned_work)
@@ -65,7 +62,7 @@ def list_needed(owned_scene: MotionScene, owned_work: MotionWorkspace, needed: B
             last += 1
         is_decided = scene.link_frame[i] - base <= MOST_BETWEEN
         for k in range(first, last):
-            needed[k] = not is_decided
+            needed[k] = not is_decided or not checked[k]
         if is_decided:
             _find_needed(scene, work, first, last, needed)
         first = last
@@ -85,15 +82,17 @@ def _find_needed(
         work: Scratch.
         begin: First pair.
         end: One after the last pair.
-        needed: False for these pairs; filled.
+        needed: Filled where it is False.
     """
     span, stretch, pairs, top = work.span, work.stretch, work.pairs, 2
     first, second = scene.pair[begin, 2], scene.link_frame[scene.pair[begin, 0]] - 1
     _take_ranges(scene, work, first, second)
-    stretch[0, 0], stretch[0, 1] = 0, end - begin
+    count = cells = 0
     for k in range(begin, end):
-        pairs[k - begin] = k
-    cells = 0
+        if not needed[k]:
+            pairs[count] = k
+            count += 1
+    stretch[0, 0], stretch[0, 1] = 0, count
     while top:
         top -= 2
         cells += 1

@@ -203,19 +203,13 @@ def torso_scene(problem: Problem, torso: int) -> MotionScene:
     )
     links = np.ascontiguousarray(problem.links[:count])
     link_frame = np.ascontiguousarray(problem.link_frame[:count])
-    gap_arm = problem.gap_arm[:count, :count]
-    arm, other = np.nonzero(gap_fixed > 0.0)
-    apart = link_frame[:, None] != link_frame[None]
-    first, second = np.nonzero(np.tril((gap_arm > 0.0) & apart))
     # `links` begin at the tool, so the shape of greater index is on the link nearer to the base.
-    pair = np.concatenate(
-        [
-            np.stack([arm, count + other, np.zeros_like(arm)], axis=1),
-            np.stack([second, first, link_frame[first]], axis=1),
-        ]
-    )
-    gap = np.concatenate([gap_fixed[arm, other], gap_arm[first, second]])
-    order = np.argsort(pair[:, 0], kind="stable")
+    apart = np.triu(link_frame[:, None] != link_frame)
+    gaps = np.concatenate([gap_fixed, problem.gap_arm[:count, :count] * apart], axis=1)
+    arm, other = np.nonzero(gaps > 0.0)
+    number = np.concatenate([count + np.arange(len(fixed)), np.arange(count)])
+    carrying = np.concatenate([np.zeros(len(fixed), np.int64), link_frame])
+    pair = np.stack([arm, number[other], carrying[other]], axis=1)
     lower, upper = problem.arm.lower, problem.arm.upper
     reach = _reach(problem.chain_p, links, link_frame)
     return MotionScene(
@@ -244,7 +238,7 @@ def torso_scene(problem: Problem, torso: int) -> MotionScene:
         leaf_shape=np.zeros(0, np.int64),
         leaf_pair=np.zeros((0, len(fixed)), np.int64),
         robot=problem.environment_bodies,
-        **pair_fields(links, fixed, pair[order].astype(np.int64), gap[order]),
+        **pair_fields(links, fixed, pair, gaps[arm, other]),
     )
 
 
@@ -314,7 +308,7 @@ def pair_fields(
     roots = np.arange(len(links))
     if below is not None:
         roots = np.union1d(always[:, 0], always[of_two_links, 1])
-    shapes = np.concatenate([links, fixed])
+    radius = np.concatenate([links[:, BOUND], fixed[:, BOUND]])
     return {
         "pair": np.ascontiguousarray(pair),
         "roots": roots.astype(np.int64),
@@ -323,7 +317,7 @@ def pair_fields(
         "first_moving": first_pair[:-1] + fixed_pairs,
         "gap": np.ascontiguousarray(gap),
         "centre": _centres(always, len(links), fixed),
-        "bound": shapes[pair[:, 0], BOUND] + shapes[pair[:, 1], BOUND],
+        "bound": radius[pair[:, 0]] + radius[pair[:, 1]],
     }
 
 
@@ -382,10 +376,9 @@ def _centres(pair: IntArray, links: int, fixed: FloatArray) -> FloatArray:
         links: Number of shapes of the arm.
         fixed: Fixed shapes, packed, shape (n_fixed, 17).
     """
-    centre = np.zeros((3, len(pair)))
-    still = np.flatnonzero(pair[:, 2] == 0)
-    centre[:, still] = fixed[pair[still, 1] - links, CENTRE : CENTRE + 3].T
-    return centre
+    centre = np.zeros((3, links + len(fixed)))
+    centre[:, links:] = fixed[:, CENTRE : CENTRE + 3].T
+    return centre.take(pair[:, 1], axis=1)
 
 
 def _reach(chain_p: FloatArray, links: FloatArray, link_frame: IntArray) -> FloatArray:

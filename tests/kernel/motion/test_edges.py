@@ -7,7 +7,7 @@ import pytest
 
 from tcs.kernel.arrays import BOX, SPHERE
 from tcs.kernel.motion.edges import NO_PAIR, certified, posture_contact
-from tcs.kernel.motion.idle import MOST_BETWEEN, list_needed
+from tcs.kernel.motion.idle import MOST_BETWEEN, needed_pairs
 from tcs.kernel.motion.scene import motion_scene, new_motion_workspace, with_pairs
 from tcs.kernel.problem import build_problem
 from tcs.kernel.verification.clutter import arm_base
@@ -59,12 +59,14 @@ def test_pairs_that_one_or_two_joints_keep_apart_are_left_out(chain, rng):
         ball = placed(SPHERE, [0.05, 0, 0], p=R_WA @ (R_AL @ out + p_AL) + p_WA)
         scene = with_obstacle(scene, ball)
     every = motion_scene(build_problem(scene, toy_grid()), HERE)
-    work, needed = new_motion_workspace(every), np.ones(len(every.pair), np.bool_)
-    list_needed(every, work, needed)
+    needed = needed_pairs(every, np.ones(len(every.pair), np.bool_))
     joints = every.link_frame[every.pair[:, 0]] - every.pair[:, 2]
     assert np.all(needed[joints > MOST_BETWEEN])
     for few in (joints == 1, joints == 2):
         assert 0 < needed[few].sum() < few.sum()
+    # Pairs that are not to be checked are kept.
+    checked = joints == 1
+    np.testing.assert_array_equal(needed_pairs(every, checked), needed | ~checked)
     postures = [within_limits(rng, chain) for _ in range(200)]
     by_joints = [(needed & (joints == n), True) for n in (1, 2)]
     for kept, touches in ((~needed, False), *by_joints):

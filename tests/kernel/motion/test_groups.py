@@ -8,8 +8,9 @@ import pytest
 from tcs.kernel.approach.scene import approach_scene
 from tcs.kernel.arrays import BOX, CAPSULE
 from tcs.kernel.collide import BOUND, CENTRE, ROTATION, SIZE, TYPE
+from tcs.kernel.motion.box_tree import NONE, boxes_around
 from tcs.kernel.motion.edges import NO_PAIR, certified, posture_contact
-from tcs.kernel.motion.groups import NONE, boxes_around, grouped
+from tcs.kernel.motion.groups import grouped
 from tcs.kernel.motion.idle import without_idle_pairs
 from tcs.kernel.motion.scene import (
     carriers,
