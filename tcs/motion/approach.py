@@ -7,18 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tcs.kernel.arrays import FloatArray
+from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.kinematics import tool_pose
-from tcs.kernel.motion.edges import posture_contact
 from tcs.kernel.motion.postures import postures_at
-from tcs.kernel.motion.scene import NO_PAIR
 from tcs.kernel.motion.straight import (
     BLOCKED,
-    DONE,
     LIMITS,
     OFF_LINE,
+    StraightSearch,
     new_straight_workspace,
-    straight_motion,
+    next_straight,
 )
 from tcs.model.tasks import TOOL_SPEED, ToolLine
 from tcs.motion.curves import Curve
@@ -105,9 +103,9 @@ class _Search:
         self.stop, self.goal = stop, stop.job.task.goals[goal]
         self.R_AG, self.p_AG = stop.goal_in_arm_base(goal)
         self.line = new_straight_workspace()
-        self.outcomes = {DONE: 0, LIMITS: 0, BLOCKED: 0}
-        self.at_goal: dict[int, int] = {}
-        """How often each pair of shapes touches at a posture at the goal."""
+        self.outcomes = np.zeros(3, np.int64)
+        # Where and how often bodies touch at postures at the goal, and before it.
+        self.at_goal, self.before = np.zeros((2, *stop.line_work.hits.shape), np.int64)
         stop.forget_contacts()
 
     def follow(self, samples: int, *, forwards: bool) -> Iterator[Access]:
@@ -115,58 +113,51 @@ class _Search:
         stop, goal = self.stop, self.goal
         begin = self.p_AG - self.R_AG @ goal.approach.offset if forwards else self.p_AG
         line = goal.approach if forwards else goal.approach.reverse()
-        for q in postures_at(stop.problem, self.R_AG, begin, samples):
-            pair = posture_contact(stop.lines, stop.line_work, q)
-            if pair != NO_PAIR:
-                if not forwards:
-                    self.at_goal[pair] = self.at_goal.get(pair, 0) + 1
-                continue
-            outcome, curve = self._straight(q, line)
+        postures = postures_at(stop.problem, self.R_AG, begin, samples)
+        search = self._search(postures, line, self.before if forwards else self.at_goal)
+        n = 0
+        while n < len(postures):
+            n, curve = self._next(search, line, n)
             if curve is not None:
                 curve = curve if forwards else curve.reverse()
-                outcome, away = self._retreat(curve)
-            self.outcomes[outcome] += 1
-            if curve is not None and away is not None:
-                yield Access(approach=curve, retreat=away)
+                away = self._retreat(curve)
+                if away is not None:
+                    yield Access(approach=curve, retreat=away)
 
-    def _retreat(self, approach: Curve) -> tuple[int, Curve | None]:
-        """Return the outcome of the retreat from the end of an approach, and its curve if DONE."""
+    def _retreat(self, approach: Curve) -> Curve | None:
+        """Return the retreat from the end of an approach, None if there is none."""
         goal = self.goal
         if goal.retreat == goal.approach.reverse():
-            return DONE, approach.reverse()
-        return self._straight(approach.q[-1], goal.retreat)
+            return approach.reverse()
+        search = self._search(approach.q[-1:].copy(), goal.retreat, self.before)
+        return self._next(search, goal.retreat, 0)[1]
 
-    def _straight(self, q: FloatArray, line: ToolLine) -> tuple[int, Curve | None]:
-        """Return the outcome of a straight motion from posture q, and its curve if it is DONE."""
+    def _search(self, q: FloatArray, line: ToolLine, contacts: IntArray) -> StraightSearch:
+        """Return the search for straight motions from postures, shape (n, 7)."""
+        offset = np.ascontiguousarray(self.R_AG @ line.offset)
+        fastest = self.stop.velocity * (line.distance / TOOL_SPEED)
+        return StraightSearch(q, offset, fastest, self.outcomes, contacts)
+
+    def _next(self, search: StraightSearch, line: ToolLine, first: int) -> tuple[int, Curve | None]:
+        """Return one more than the number of the next posture that begins a motion, and that."""
         pieces = max(2, int(np.ceil(line.distance / SPACING)))
         points, tangents = np.empty((pieces + 1, 7)), np.empty((pieces + 1, 7))
-        outcome = straight_motion(
-            self.stop.lines,
-            self.stop.line_work,
-            self.line,
-            q,
-            np.ascontiguousarray(self.R_AG @ line.offset),
-            self.stop.velocity * (line.distance / TOOL_SPEED),
-            points,
-            tangents,
-        )
-        if outcome != DONE:
-            return outcome, None
+        lines, work = self.stop.lines, self.stop.line_work
+        n = next_straight(lines, work, self.line, search, first, points, tangents)
+        if n == len(search.q):
+            return n, None
         knots = np.linspace(0.0, 1.0, pieces + 1)
-        return DONE, Curve(knots, points, tangents, fastest=TOOL_SPEED / line.distance)
+        return n + 1, Curve(knots, points, tangents, fastest=TOOL_SPEED / line.distance)
 
     def nothing(self) -> Accesses:
         """Return why nothing was found."""
         if self.outcomes[BLOCKED]:
-            return Accesses((), "approach_blocked", self.stop.most_frequent_on_lines())
+            return Accesses(
+                (), "approach_blocked", self.stop.most_frequent(self.stop.line_work.hits)
+            )
         if self.outcomes[LIMITS]:
             return Accesses((), "approach_limits", None)
-        counts: dict[BodyPair, int] = {}
-        for pair, count in self.at_goal.items():
-            names = self.stop.bodies(self.stop.lines, pair)
-            counts[names] = counts.get(names, 0) + count
-        most = max(counts, key=lambda names: counts[names], default=None)
-        return Accesses((), "unreached", most)
+        return Accesses((), "unreached", self.stop.most_frequent(self.at_goal))
 
 
 def _spread(stop: Stop, found: list[Access]) -> tuple[Access, ...]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tcs.errors import TaskError
-from tcs.kernel.arrays import FloatArray
+from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.motion.edges import posture_contact
 from tcs.kernel.motion.groups import grouped
 from tcs.kernel.motion.idle import needed_pairs
@@ -277,11 +277,14 @@ class Stop:
 
     def bodies(self, motion: MotionScene, pair: int) -> BodyPair:
         """Return the names of the bodies of a pair of shapes of one of the two scenes."""
-        lowered = self.grid.lowered
-        # Robot bodies are numbered after those of the environment.
-        names = (*lowered.environment_bodies, *lowered.robot_bodies)
-        first, second = (names[int(motion.body[i])] for i in motion.pair[pair, :2])
+        first, second = (self._names[int(motion.body[i])] for i in motion.pair[pair, :2])
         return first, second
+
+    @property
+    def _names(self) -> tuple[str, ...]:
+        """Names of the bodies: robot bodies are numbered after those of the environment."""
+        lowered = self.grid.lowered
+        return *lowered.environment_bodies, *lowered.robot_bodies
 
     def forget_contacts(self) -> None:
         """Start counting anew which pairs block edges and straight motions."""
@@ -289,18 +292,18 @@ class Stop:
 
     def most_frequent_contact(self) -> BodyPair | None:
         """Return the pair of bodies that blocked most edges since `forget_contacts`."""
-        return self._most_frequent(self.motion, self.work)
+        return self.most_frequent(self.work.hits)
 
-    def most_frequent_on_lines(self) -> BodyPair | None:
-        """Return the pair of bodies that blocked most straight motions since `forget_contacts`."""
-        return self._most_frequent(self.lines, self.line_work)
+    def most_frequent(self, contacts: IntArray) -> BodyPair | None:
+        """Return the pair of bodies with the most contacts, None if there are none.
 
-    def _most_frequent(self, motion: MotionScene, work: MotionWorkspace) -> BodyPair | None:
-        counts: dict[BodyPair, int] = {}
-        for pair in np.flatnonzero(work.hits):
-            names = self.bodies(motion, int(pair))
-            counts[names] = counts.get(names, 0) + int(work.hits[pair])
-        return max(counts, key=lambda names: counts[names], default=None)
+        Args:
+            contacts: Numbers of contacts, shape as that of `MotionWorkspace.hits`.
+        """
+        if not np.any(contacts):
+            return None
+        first, second = np.unravel_index(np.argmax(contacts), contacts.shape)
+        return self._names[int(first)], self._names[int(second)]
 
     def rest_contact(self) -> BodyPair | None:
         """Return two bodies in contact while the arm rests, None if nothing touches."""

@@ -22,6 +22,7 @@ from tcs.kernel.motion.edges import (
     posture_is_free,
 )
 from tcs.kernel.motion.nearest import count_blocked, nearest, place_node
+from tcs.kernel.motion.pairs import count_hit
 from tcs.kernel.motion.random import uniform
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
 from tcs.kernel.motion.shortcut import cut_corners, drop_postures
@@ -74,7 +75,7 @@ def connect(
 
     Args:
         owned_scene: The scene.
-        owned_work: Scratch; `hits` counts how often each pair blocked an edge.
+        owned_work: Scratch; `hits` counts which bodies blocked an edge.
         owned_trees: Holds the random state; `path` and `ends` are filled. Joints without limits
             may end full turns away from the goal.
         starts: Postures at which nothing touches [rad], shape (n, 7).
@@ -297,7 +298,7 @@ def _grow(
         reached = fraction == 1.0 and scene.period[k] == 0.0
         q[new, k] = target[k] if reached else q[n, k] + fraction * angle
     if not posture_is_free(scene, work, q[new]):
-        work.hits[work.contact[0]] += 1
+        count_hit(scene, work, work.contact[0])
         count_blocked(trees, side, n)
         return NONE
     if not edge_seems_free(scene, work, q[n], q[new]):

@@ -17,6 +17,7 @@ from tcs.kernel.motion.leaves import contact_here
 from tcs.kernel.motion.near_lists import append_below, list_near
 from tcs.kernel.motion.pairs import (
     ROUNDING,
+    count_hit,
     is_near,
     is_near_on_piece,
     is_of_groups,
@@ -126,7 +127,7 @@ def edge_seems_free(
             for k in range(7):
                 work.q[k] = start[k] + (end[k] - start[k]) * (n / parts)
             if not is_free_here(scene, work):
-                work.hits[work.contact[0]] += 1
+                count_hit(scene, work, work.contact[0])
                 return False
         n = (n + stride) % parts
     return True
@@ -214,16 +215,16 @@ def _listed_touch(scene: MotionScene, work: MotionWorkspace, count: int, at: flo
     for m in range(count):
         k = work.pairs[m]
         if not is_of_groups(scene, k) and is_near(scene, work, k, False):
-            _block(work, k, at)
+            _block(scene, work, k, at)
             return True
     return False
 
 
 @inner
-def _block(work: MotionWorkspace, k: int, at: float) -> None:
+def _block(scene: MotionScene, work: MotionWorkspace, k: int, at: float) -> None:
     """Record that pair k blocks the curve."""
     work.contact[0], work.met[0] = k, at
-    work.hits[k] += 1
+    count_hit(scene, work, k)
 
 
 @inner
@@ -255,7 +256,7 @@ def _halves_are_free(
         begin, end = span[n, 0], span[n, 1]
         left = _uncertified(scene, work, begin, end, stretch[n, 0], stretch[n, 1], used)
         if left < 0 or (left > 0 and top + 2 > most):
-            _block(work, work.contact[0], 0.5 * (begin + end))
+            _block(scene, work, work.contact[0], 0.5 * (begin + end))
             return False
         if left > 0:
             _push_halves(work, top, begin, end, used, used + left)

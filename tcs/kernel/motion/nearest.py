@@ -73,16 +73,17 @@ def _any_nearer(
         least: The squared distance [rad^2].
     """
     square, penalty = trees.square[: last - first], trees.penalty[side, first:last]
+    half = np.float32(0.5)
     for n in range(len(square)):
-        square[n] = 0.0
+        square[n] = np.float32(0.0)
     # No branch and no early end: LLVM makes these loops vector loops.
     for k in range(7):
-        joint, at, weight = trees.joint[side, k, first:last], target[k], scene.weight[k]
-        period = scene.period[k]
+        joint, at = trees.joint[side, k, first:last], np.float32(target[k])
+        weight, period = np.float32(scene.weight[k]), np.float32(scene.period[k])
         if period > 0.0:
             for n in range(len(square)):
                 angle = joint[n] - at
-                angle -= period * np.floor(angle / period + 0.5)
+                angle -= period * np.floor(angle / period + half)
                 square[n] += weight * angle * angle
         else:
             for n in range(len(square)):

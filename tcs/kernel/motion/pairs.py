@@ -238,6 +238,12 @@ def is_near(scene: MotionScene, work: MotionWorkspace, k: int, grown: bool) -> b
 
 
 @inner
+def count_hit(scene: MotionScene, work: MotionWorkspace, k: int) -> None:
+    """Count that pair k blocks a curve."""
+    work.hits[scene.body[scene.pair[k, 0]], scene.body[scene.pair[k, 1]]] += 1
+
+
+@inner
 def is_of_groups(scene: MotionScene, k: int) -> bool:
     """Return whether there are pairs below pair k, so that it cannot be in contact itself."""
     return k < len(scene.below) and scene.below[k, 0] < scene.below[k, 1]

@@ -171,7 +171,8 @@ class MotionWorkspace(NamedTuple):
     contact: IntArray
     """The pair found in contact last, -1 for none, shape (1,)."""
     hits: IntArray
-    """How often each pair blocked a curve, shape (n_pairs,)."""
+    """How often pairs of each two bodies blocked a curve, shape (n_bodies, n_bodies): that of the
+    arm's shape first."""
 
 
 def motion_scene(problem: Problem, configuration: int) -> MotionScene:
@@ -323,7 +324,7 @@ def pair_fields(
 
 def new_motion_workspace(scene: MotionScene) -> MotionWorkspace:
     """Return scratch memory for one worker."""
-    arm, pairs = len(scene.links), len(scene.pair)
+    arm, pairs, bodies = len(scene.links), len(scene.pair), int(scene.body.max()) + 1
     shapes = np.zeros((arm + len(scene.fixed), COLUMNS))
     shapes[arm:] = scene.fixed
     return MotionWorkspace(
@@ -355,7 +356,7 @@ def new_motion_workspace(scene: MotionScene) -> MotionWorkspace:
         apart=np.empty(GROUP),
         between=np.empty((3, 7)),
         contact=np.full(1, NO_PAIR, np.int64),
-        hits=np.zeros(pairs, np.int64),
+        hits=np.zeros((bodies, bodies), np.int64),
     )
 
 

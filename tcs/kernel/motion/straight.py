@@ -9,7 +9,7 @@ import numpy as np
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant, jit
 from tcs.kernel.kinematics import fill_jacobian, place_tool, pose_error
-from tcs.kernel.motion.edges import curve_is_free
+from tcs.kernel.motion.edges import curve_is_free, posture_is_free
 from tcs.kernel.motion.link_poses import LANES, place_links
 from tcs.kernel.motion.scene import MOST_PIECES, MotionScene, MotionWorkspace
 from tcs.kernel.numeric.newton import (
@@ -55,6 +55,21 @@ class StraightWorkspace(NamedTuple):
     """1 for each joint that rests at a limit, shape (7,)."""
     q: FloatArray
     """Trial posture [rad], shape (7,)."""
+
+
+class StraightSearch(NamedTuple):
+    """Postures, one of which may begin a straight motion, and what has become of them."""
+
+    q: FloatArray
+    """Joint angles [rad], shape (n, 7)."""
+    offset: FloatArray
+    """Motion of the tool along the line, in A [m], shape (3,)."""
+    fastest: FloatArray
+    """As for `straight_motion`, shape (7,)."""
+    outcomes: IntArray
+    """How often a motion ended in each way: DONE, LIMITS or BLOCKED, shape (3,)."""
+    contacts: IntArray
+    """How often two bodies touch at these postures, shape as that of `MotionWorkspace.hits`."""
 
 
 @jit
@@ -103,6 +118,60 @@ def straight_motion(
         DONE, LIMITS or BLOCKED.
     """
     scene, work, line = unowned(owned_scene), unowned(owned_work), unowned(owned_line)
+    return _lead(scene, work, line, q, offset, fastest, points, tangents)
+
+
+@jit
+def next_straight(
+    owned_scene: MotionScene,
+    owned_work: MotionWorkspace,
+    owned_line: StraightWorkspace,
+    owned_search: StraightSearch,
+    first: int,
+    points: FloatArray,
+    tangents: FloatArray,
+) -> int:
+    """Return the number of the next posture that is free and begins a straight motion.
+
+    Args:
+        owned_scene: The scene.
+        owned_work: Scratch.
+        owned_line: Scratch.
+        owned_search: The postures and the line; outcomes and contacts are counted.
+        first: Number of the first posture to try.
+        points: As for `straight_motion`, filled with the motion found.
+        tangents: As for `straight_motion`, filled with those of the motion found.
+
+    Returns:
+        Number of the posture, the number of all if there is none.
+    """
+    scene, work, line = unowned(owned_scene), unowned(owned_work), unowned(owned_line)
+    search = unowned(owned_search)
+    for n in range(first, len(search.q)):
+        q = search.q[n]
+        if not posture_is_free(scene, work, q):
+            i, j = scene.pair[work.contact[0], 0], scene.pair[work.contact[0], 1]
+            search.contacts[scene.body[i], scene.body[j]] += 1
+            continue
+        outcome = _lead(scene, work, line, q, search.offset, search.fastest, points, tangents)
+        search.outcomes[outcome] += 1
+        if outcome == DONE:
+            return n
+    return len(search.q)
+
+
+@inner
+def _lead(
+    scene: MotionScene,
+    work: MotionWorkspace,
+    line: StraightWorkspace,
+    q: FloatArray,
+    offset: FloatArray,
+    fastest: FloatArray,
+    points: FloatArray,
+    tangents: FloatArray,
+) -> int:
+    """Do as `straight_motion`."""
     newton, last = line.newton, len(points) - 1
     place_links(scene.chain_R, scene.chain_p, q, line.turns, newton.link_R, newton.link_p)
     place_tool(scene.chain_R, scene.chain_p, newton.link_R, newton.link_p, line.R_AT, line.p_AT)

@@ -67,7 +67,7 @@ def test_the_planner_counts_the_steps_that_are_blocked(scene):
     assert sum(int(one.sum()) for one in blocked) > 0
     for side in range(2):
         counted = np.minimum(blocked[side], COUNTED)
-        # The same sum of the same numbers: not a bit differs.
+        # The same sum of the same numbers in single precision: not a bit differs.
         np.testing.assert_array_equal(
-            trees.penalty[side, : trees.nodes[side]], 1.0 + BLOCKED * counted
+            trees.penalty[side, : trees.nodes[side]], np.float32(1.0 + BLOCKED * counted)
         )
