@@ -52,7 +52,10 @@ def main() -> None:
             nominal: str | Path = environment
             if environment == "bed":
                 nominal = at_nominal_position(environment, Path(folder))
-            files = [tcs.score(task, nominal, robot, jobs=options.jobs) for robot in ROBOTS]
+            files = [
+                tcs.score(task, nominal, robot, jobs=options.jobs, approach=False)
+                for robot in ROBOTS
+            ]
             rows.append([f"{task}, {environment}", *compared(*files)])
             print(" | ".join(rows[-1]), flush=True)
     record("arms", columns, rows)

@@ -165,6 +165,7 @@ def ran(job: Job, folder: Path, until: str | None) -> dict[str, Any] | None:
                 person=job.person,
                 jobs=1,
                 on_progress=lambda done, _: times.append((done, time.process_time())),
+                approach=False,
             )
         except tcs.TcsError as error:
             return _kept(path, {"error": str(error)})

@@ -241,7 +241,7 @@ def score_words(folder: Path) -> list[str]:
         f"{FREE if len(joints) == 5 else ''}goals:\n{goals}"
     )
     words = ["score", "task.yaml", "--environment", "board.yaml", "--robot", "drafted.yaml"]
-    return [*words, "--out", "out.tcs", "--json"]
+    return [*words, "--no-approach", "--out", "out.tcs", "--json"]
 
 
 def run(words: list[str], folder: Path, limit: float) -> Run:

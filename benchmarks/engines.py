@@ -41,7 +41,11 @@ def main() -> None:
         for number in range(options.rounds + 1):
             for name, engine in engines.items():
                 file = tcs.score(
-                    options.task, options.environment, jobs=options.jobs, engine=engine
+                    options.task,
+                    options.environment,
+                    jobs=options.jobs,
+                    engine=engine,
+                    approach=False,
                 )
                 digests.add(digest(file))
                 if number:

@@ -44,7 +44,7 @@ def main() -> None:
         path = options.scores / default_path(task, environment, ROBOT)
         if not path.exists():
             path.parent.mkdir(parents=True, exist_ok=True)
-            tcs.save(path, tcs.score(task, environment, ROBOT, jobs=options.jobs))
+            tcs.save(path, tcs.score(task, environment, ROBOT, jobs=options.jobs, approach=False))
         trials = Trials.of(tcs.load(path))
         sampling = {"samples": options.samples, "seed": options.seed, "jobs": options.jobs}
         for members in (1, 2):

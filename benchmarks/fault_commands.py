@@ -111,7 +111,15 @@ class Command:
 def small_scores(folder: Path) -> tuple[Path, Path]:
     """Write a small environment and its scores into a folder."""
     environment = small_environment(folder)
-    make = ("score", "shaving", "--environment", str(environment), "--out", "{out}")
+    make = (
+        "score",
+        "shaving",
+        "--no-approach",
+        "--environment",
+        str(environment),
+        "--out",
+        "{out}",
+    )
     variables = {**os.environ, "PYTHONPATH": str(CHECKOUT)}
     Command("score", make, "scores.tcs").run(folder, variables).communicate()
     return environment, folder / "scores.tcs"
@@ -124,7 +132,7 @@ def scoring_commands(environment: Path, scores: Path) -> tuple[Command, ...]:
         environment: A small environment.
         scores: Its scores.
     """
-    make = ("score", "shaving", "--environment", str(environment))
+    make = ("score", "shaving", "--no-approach", "--environment", str(environment))
     samples = ("--samples", "64")
     people = ("--bodies", "6", "--sets", "2", "--map", "{out}")
     return (

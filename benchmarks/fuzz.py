@@ -85,7 +85,7 @@ def _scored(task: Path, environment: Path, robot: Path | str) -> tuple[str, str]
     job = load_job(task, environment, robot)
     if job.scored_grid.size > MAX_CONFIGURATIONS:
         return "accepted", ""
-    scores = tcs.score(task, environment, robot)
+    scores = tcs.score(task, environment, robot, approach=False)
     found = tcs.verify(scores, pairs=PAIRS, dense=0)
     if not found.is_sound:
         return "false answer", json.dumps(found.to_json())

@@ -197,7 +197,9 @@ def _write_scores(folder: Path) -> None:
     """Write the scores of the kitchen."""
     import tcs
 
-    scores = tcs.score(folder / "task.yaml", folder / "kitchen.yaml", folder / "iiwa7.yaml")
+    scores = tcs.score(
+        folder / "task.yaml", folder / "kitchen.yaml", folder / "iiwa7.yaml", approach=False
+    )
     tcs.save(folder / "scores.tcs", scores)
 
 

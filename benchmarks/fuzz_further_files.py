@@ -125,7 +125,7 @@ def _write_motions(folder: Path) -> None:
     save_motions(folder / "scores.tcs.motions", examine(scores, seed=0))
     save_plan(folder / "plan.json", plan(scores, scores.nominal.sets.best, seed=0))
     with tempfile.TemporaryDirectory(dir=folder) as blocks:
-        tcs.score(*three(folder), blocks=BlockFolder(Path(blocks)))
+        tcs.score(*three(folder), blocks=BlockFolder(Path(blocks)), approach=False)
         # Another block has the sets.
         (block,) = Path(blocks).rglob("0*.block")
         shutil.copy(block, folder / "kept.block")

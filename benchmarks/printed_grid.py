@@ -73,7 +73,7 @@ def best_under_error(
     task: str, environment: Path, only: tuple[str, ...], options: argparse.Namespace
 ) -> Evaluation:
     """Return the evaluation of the best set of a task on a grid."""
-    file = tcs.score(task, environment, "pr2", only=only, jobs=options.jobs)
+    file = tcs.score(task, environment, "pr2", only=only, jobs=options.jobs, approach=False)
     return evaluate(file, samples=options.samples, seed=options.seed, jobs=options.jobs)
 
 

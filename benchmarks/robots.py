@@ -121,7 +121,7 @@ def finding(work: Work, options: argparse.Namespace) -> dict[str, Any]:
         if line["key"] == key:
             row(f"verify {work.line}", f"{line['text']} (measured before)")
             return dict(line["found"])
-    file = score(work.task, work.environment, work.robot, jobs=options.jobs)
+    file = score(work.task, work.environment, work.robot, jobs=options.jobs, approach=False)
     verification = verify(
         file,
         pairs=options.pairs,

@@ -53,7 +53,9 @@ def main() -> None:
             if environment.startswith("bed"):
                 nominal = at_nominal_position(environment, Path(folder))
             for measure in MEASURES:
-                file = tcs.score(task, nominal, "pr2", measure=measure, jobs=options.jobs)
+                file = tcs.score(
+                    task, nominal, "pr2", measure=measure, jobs=options.jobs, approach=False
+                )
                 found = evaluate(
                     file, samples=options.samples, seed=options.seed, jobs=options.jobs
                 )

@@ -153,7 +153,7 @@ def measured(name: str, rules: Rules, folder: Path, options: argparse.Namespace)
     text = GRID.format(rules.torso_step)
     place = written(folder / "environment.yaml", environment, text + rules.environment)
     robot = written(folder / "robot.yaml", "pr2", rules.robot)
-    file = tcs.score(task, place, robot, max_members=rules.members, jobs=1)
+    file = tcs.score(task, place, robot, max_members=rules.members, jobs=1, approach=False)
     trials = Trials.of(file, body_collisions=rules.body_collisions)
     of = PerturbedPoints if rules.arm_collides else WithinReach
     if rules.is_refined:
@@ -163,7 +163,7 @@ def measured(name: str, rules: Rules, folder: Path, options: argparse.Namespace)
     found = judged(of(trials, trials.errors.draw(options.samples, FIRST_SAMPLE), 1), values)
     by_tcs = found
     if rules.body_collisions != "paper" or rules.environment or rules.robot:
-        plain = Trials.of(tcs.score(task, environment, "pr2", jobs=1))
+        plain = Trials.of(tcs.score(task, environment, "pr2", jobs=1, approach=False))
         drawn = PerturbedPoints(plain, plain.errors.draw(options.samples, FIRST_SAMPLE), 1)
         by_tcs = judged(drawn, values)
     published = load_paper().published(task, environment)

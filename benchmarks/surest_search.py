@@ -79,7 +79,7 @@ def main() -> None:
     rows = []
     for name in options.rows:
         task, environment = name.split("/")
-        file = tcs.score(task, environment, "pr2", jobs=1)
+        file = tcs.score(task, environment, "pr2", jobs=1, approach=False)
         robust = tcs.robustify(file, sets=400, samples=256, jobs=1)
         refined = first_set(tcs.refine(robust, jobs=1, **SUREST))
         anew = from_random(file, options.drawn, options.seed)

@@ -85,7 +85,12 @@ def score(path: Path, row: tuple[str, str], jobs: int) -> None:
     """Score a row and save it."""
     with terminal.progress_bar(f"configurations, {path.stem}") as on_progress:
         file = tcs.score(
-            *row, ROBOT, jobs=jobs, on_progress=on_progress, on_compile=terminal.note_compiling
+            *row,
+            ROBOT,
+            approach=False,
+            jobs=jobs,
+            on_progress=on_progress,
+            on_compile=terminal.note_compiling,
         )
     tcs.save(path, file)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -66,13 +67,15 @@ def score(
         ),
     ] = "isotropy",
     approach: Annotated[
-        bool,
+        bool | None,
         typer.Option(
             "--approach/--no-approach",
             help="Count a goal as reached only if a posture there can be approached: backwards "
-            "along the goal's straight line, within the limits, touching nothing.",
+            "along the goal's straight line, within the limits, touching nothing; or, as in the "
+            "papers, if any posture reaches it.",
+            show_default="with approach where it can be scored",
         ),
-    ] = False,
+    ] = None,
     refine: Annotated[
         bool,
         typer.Option("--refine", help="Then refine the best sets between the grid points."),
@@ -210,6 +213,7 @@ def score(
             **offline,
             **scoring_options,
         )
+        _note_without_approach(rows)
         if refine:
             for row in rows:
                 if row["best"]:
@@ -239,6 +243,7 @@ def score(
                 **offline,
                 **scoring_options,
             )
+        _note_without_approach([result])
         if refine:
             result["refinement"] = refined_in_place(path, jobs)
         result = _with_places(result)
@@ -262,7 +267,15 @@ def score(
     result = files.score_observed_to_file(
         task, environment, robot, path, observation, **scoring_options
     )
+    _note_without_approach([result])
     terminal.print_result(_with_places(result), tables.report_observed, as_json=as_json)
+
+
+def _note_without_approach(results: Sequence[Mapping[str, Any]]) -> None:
+    """Say why approaches were not scored, where nobody asked for that."""
+    for reason in dict.fromkeys(result["no_approach"] for result in results):
+        if reason is not None:
+            terminal.note(f"scored without approach: {reason}.")
 
 
 def _with_places(result: dict[str, Any]) -> dict[str, Any]:
@@ -309,6 +322,7 @@ def verify(
 
     import tcs
     from tcs.placement.scoring.verify import FALSE_VERDICT
+    from tcs.placement.store import APPROACH
 
     loaded = tcs.load(file)
     with terminal.progress_bar("pairs") as on_progress:
@@ -323,7 +337,7 @@ def verify(
             on_progress=on_progress,
         )
     result, is_sound = {**found.to_json(), "approaches": None}, found.is_sound
-    if "approach" in loaded.metadata:
+    if APPROACH in loaded.metadata:
         approaches = _verify_approaches(loaded, sizes.pairs // PAIRS_PER_APPROACH, sizes.seed)
         result["approaches"] = approaches.to_json()
         if not approaches.is_sound:

@@ -20,7 +20,7 @@ from tcs.motion.stops import Stop
 from tcs.placement.scoring.approaches import approach_lines
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.rebuild import rebuild_scene
-from tcs.placement.store import ScoreFile, files_of_arms
+from tcs.placement.store import APPROACH, ScoreFile, files_of_arms
 
 LINE_BAR = 1e-3
 """Greatest error of the tool along the line [rad and m]: twice what the kernel allows in the middle
@@ -159,7 +159,7 @@ def check_approaches(
     """
     if pairs < 0:
         raise TcsError(f"check_approaches: pairs is {pairs}; it may not be negative.")
-    if "approach" not in file.metadata:
+    if APPROACH not in file.metadata:
         raise TcsError("The file was scored without approach: it has no approaches to check.")
     files = files_of_arms(file)
     reached = [

@@ -140,7 +140,7 @@ class ScoreRequest(Limited):
     robot: CatalogueName = "pr2"
     arms: Text | None = None
     measure: Text = "isotropy"
-    approach: Annotated[bool, Field(strict=True)] = False
+    approach: Annotated[bool, Field(strict=True)] | None = None
     rules: Text = "paper"
     same_environment: Annotated[bool, Field(strict=True)] = False
     max_members: Annotated[int, Field(strict=True, ge=1, le=3)] = 2

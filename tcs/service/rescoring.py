@@ -17,7 +17,7 @@ from tcs.placement.constraints import Constraints, recorded_constraints
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.offline import ScoringSetup
 from tcs.placement.scoring.rebuild import recorded_job
-from tcs.placement.store import ScoreFile
+from tcs.placement.store import APPROACH, ScoreFile
 from tcs.service.conversions import regions_of, settings_of
 from tcs.service.jobs import Progress
 from tcs.service.requests import RescoreRequest
@@ -75,7 +75,7 @@ class Rescorer:
             file.metadata["task"], self._sent.made(changed), file.metadata["robot"],
             measure=file.metadata["measure"], jobs=self._threads,
             sets={"max_members": request.max_members}, constraints=Constraints(forbid=forbid),
-            approach="approach" in file.metadata, build=self._scene_of,
+            approach=APPROACH in file.metadata, build=self._scene_of,
         )  # fmt: skip
         return setup.score(begun=begun, on_progress=progress, on_compile=progress.compiling)
 

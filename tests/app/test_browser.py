@@ -43,7 +43,9 @@ def url(tmp_path_factory):
     folder = tmp_path_factory.mktemp("app")
     grid = {**BESIDE, "base_yaw": (0, 45, 8)}
     environment = write_environment(folder, "beside", grid)
-    tcs.save(folder / "beside.tcs", tcs.score("shaving", environment=str(environment)))
+    tcs.save(
+        folder / "beside.tcs", tcs.score("shaving", environment=str(environment), approach=False)
+    )
     with Engine() as engine:
         engine.open_file(folder / "beside.tcs")
         application = make_application(engine, Access())

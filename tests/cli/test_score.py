@@ -409,11 +409,15 @@ def test_script_is_the_command(tmp_path):
     assert "Did you mean 'shaving'?" in done.stderr
 
 
-def test_scoring_with_approach(tcs_command, corner, corner_file, tmp_path):
-    path = tmp_path / "out.tcs"
-    words = ("score", "shaving", "--environment", corner, "--out", path, "--json")
-    result = tcs_command(*words, "--approach").json
-    found, postures = result["approach"], tcs.load(corner_file)
+def test_scoring_with_approach(tcs_command, corner, tmp_path):
+    path, without = tmp_path / "out.tcs", tmp_path / "without.tcs"
+    words = ("score", "shaving", "--environment", corner, "--json")
+    result = tcs_command(*words, "--no-approach", "--out", without).json
+    assert (result["approach"], result["no_approach"]) == (None, None)
+    ran = tcs_command(*words, "--out", path)
+    assert ran.err == ""
+    result, postures = ran.json, tcs.load(without)
+    found = result["approach"]
     assert (found["tool_speed"], found["approachable"]) == (0.1, result["reached_pairs"])
     assert (found["limits"], found["blocked"]) == tuple(
         result["reasons"][f"approach_{name}"] for name in ("limits", "blocked")
@@ -432,8 +436,22 @@ def test_scoring_with_approach(tcs_command, corner, corner_file, tmp_path):
     checks = [check["reason"] for check in told["checks"]]
     assert checks[-2:] == ["approach_limits", "approach_blocked"]
     assert "approach" in tcs_command("explain", path, "--goal", g, "--configuration", h).out
-    assert tcs_command(*words, "--no-approach").json["approach"] is None
-    np.testing.assert_array_equal(tcs.load(path).nominal.scores.reason, before.reason)
+    chosen = tcs_command(*words, "--approach", "--out", tmp_path / "chosen.tcs").json
+    assert chosen["reasons"] == result["reasons"]
+
+
+def test_why_approaches_are_not_scored_is_said_in_one_line(tcs_command, tmp_path):
+    path, environment = tmp_path / "out.tcs", write_environment(tmp_path, "corner", CORNER)
+    words = ("score", "feeding", "--environment", environment, "--robot", "stretch", "--out", path)
+    ran = tcs_command(*words)
+    (line,) = (line for line in ran.err.splitlines() if line.startswith("tcs: "))
+    assert line.startswith("tcs: scored without approach: approaches are scored for arms of seven")
+    assert "with approach" not in ran.out
+    assert tcs_command(*words, "--no-approach").err.count("without approach") == 0
+    path.unlink()
+    refused = tcs_command(*words, "--approach")
+    assert (refused.code, refused.err.count("\n"), path.exists()) == (1, 1, False)
+    assert "--no-approach" in refused.err
 
 
 @pytest.mark.slow

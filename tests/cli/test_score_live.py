@@ -25,7 +25,9 @@ def test_the_environment_is_scored_as_observed(tcs_command, corner, tmp_path, mo
     path = Path(ran.json["file"])
     assert path == Path("shaving-corner-pr2-live.tcs")
     expected = tcs.score_observed(
-        "shaving", corner, observation={"person_x": 0.025, "head_tilt": math.radians(3.0)}
+        "shaving",
+        corner,
+        observation={"person_x": 0.025, "head_tilt": math.radians(3.0)},
     )
     assert (tcs.load(path).nominal.scores.dexterity == expected.nominal.scores.dexterity).all()
     assert tcs_command("verify", path, "--pairs", 5, "--dense", 0).code == 0

@@ -19,7 +19,7 @@ PAGES = [
 def scored(tmp_path_factory):
     """A score file: any will do, so one that is made in a second."""
     path = tmp_path_factory.mktemp("scored") / "feeding.tcs"
-    tcs.save(path, tcs.score("feeding"))
+    tcs.save(path, tcs.score("feeding", approach=False))
     return path
 
 

@@ -100,7 +100,10 @@ def test_colours_of_verdicts():
 def test_parts_of_a_report(tmp_path):
     # An environment with states has a report with every part.
     path = tmp_path / "bed.tcs"
-    tcs.save(path, tcs.score("scratching_chest", DOCS.parent / "examples" / "small_bed.yaml"))
+    tcs.save(
+        path,
+        tcs.score("scratching_chest", DOCS.parent / "examples" / "small_bed.yaml", approach=False),
+    )
     report = make_score_page(
         make_score_report(path, sizes=CheckSizes(pairs=1, dense=0)), command="tcs report"
     )

@@ -22,7 +22,9 @@ def two_goals(tmp_path_factory):
     path = folder / "shaving.yaml"
     path.write_text(yaml.safe_dump(task))
     scored = folder / "two_goals.tcs"
-    tcs.save(scored, tcs.score(path, "wheelchair", "pr2", jobs=1, only=CONFIGURATION))
+    tcs.save(
+        scored, tcs.score(path, "wheelchair", "pr2", jobs=1, only=CONFIGURATION, approach=False)
+    )
     return scored
 
 

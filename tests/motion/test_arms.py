@@ -15,7 +15,7 @@ from tests.environments import CORNER, write_environment
 @pytest.fixture(scope="module")
 def both(tmp_path_factory):
     corner = write_environment(tmp_path_factory.mktemp("arms"), "corner", CORNER)
-    return tcs.score("shaving", corner, "pr2", arms="both")
+    return tcs.score("shaving", corner, "pr2", arms="both", approach=False)
 
 
 @pytest.fixture(scope="module")

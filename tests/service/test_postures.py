@@ -17,7 +17,9 @@ from tests.environments import CORNER, write_environment
 def path(tmp_path_factory):
     folder = tmp_path_factory.mktemp("postures")
     environment = write_environment(folder, "corner", CORNER)
-    tcs.save(folder / "corner.tcs", tcs.score("shaving", environment=str(environment)))
+    tcs.save(
+        folder / "corner.tcs", tcs.score("shaving", environment=str(environment), approach=False)
+    )
     return folder / "corner.tcs"
 
 

@@ -115,6 +115,8 @@ def report_scores(result: Mapping[str, Any]) -> None:
         f"{result['scoring_seconds']:.2f} s; {result['candidates']:,} {candidates}, "
         f"{result['sets']:,} sets kept."
     )
+    if result["approach"] is not None:
+        out.print(_approach_text(result["approach"]))
     if result["ik"] == "numeric":
         out.print(NUMERIC_NOTE)
     reasons = new_table("configuration and goal", ">pairs", ">of all")
@@ -137,6 +139,16 @@ def report_scores(result: Mapping[str, Any]) -> None:
             out.print(line)
         out.print(members_table(best["members"]))
     out.print(f"wrote {result['file']}")
+
+
+def _approach_text(found: Mapping[str, Any]) -> str:
+    """Return which of the pairs that a posture reaches can be approached."""
+    pairs = found["approachable"] + found["limits"] + found["blocked"]
+    return (
+        f"scored with approach: of {pairs:,} pairs that a posture reaches, "
+        f"{found['approachable']:,} ({percentage(found['fraction'])}) can be approached "
+        "(--no-approach counts all)."
+    )
 
 
 def report_observed(result: Mapping[str, Any]) -> None:

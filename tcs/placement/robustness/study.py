@@ -18,7 +18,7 @@ from tcs.placement.robustness.evaluation import Evaluation, evaluate
 from tcs.placement.robustness.gains import Gain, Prediction, predictions, robust_gains
 from tcs.placement.robustness.losses import Losses, losses
 from tcs.placement.robustness.trials import Trials
-from tcs.placement.store import ScoreFile, load_scores
+from tcs.placement.store import APPROACH, ScoreFile, load_scores
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,8 +92,14 @@ def check_row(path: Path, file: ScoreFile, task: str, environment: str, robot: s
         robot: Name of the expected robot.
 
     Raises:
-        StoreMismatchError: If task, environment or robot differ.
+        StoreMismatchError: If task, environment or robot differ, or it was scored with approach,
+            which the paper does not know.
     """
+    if APPROACH in file.metadata:
+        raise StoreMismatchError(
+            f"Score file '{path}' was scored with approach, and the paper's rows are not. Give "
+            "another folder of score files, or remove this file to have the row scored."
+        )
     expected = {"task": task, "environment": environment, "robot": robot}
     for key, name in expected.items():
         found = file.metadata[key]

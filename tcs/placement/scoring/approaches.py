@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -12,12 +13,14 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
-from tcs.errors import ArmClassError
+from tcs.errors import ArmClassError, RobotError
 from tcs.files.mapped import chunks
-from tcs.kernel.analytic.solver import is_outside
+from tcs.kernel.analytic.solver import any_solver, is_outside
 from tcs.kernel.problem import Problem
+from tcs.model.scene import Scene, arm_chain
 from tcs.model.tasks import TOOL_SPEED
 from tcs.placement.scoring.job import Job
+from tcs.placement.store import APPROACH, WITHOUT_APPROACH
 
 if TYPE_CHECKING:
     from tcs.kernel.approach.scene import LineScene
@@ -47,27 +50,71 @@ def approach_lines(job: Job) -> ApproachLines:
     )
 
 
-def approach_entry() -> dict[str, Any]:
-    """Return the entry of a file's metadata that records scoring with approach."""
-    return {"approach": {"tool_speed": TOOL_SPEED}}
+@dataclass(frozen=True)
+class ApproachChoice:
+    """Whether goals are scored with their approaches, the same for all of a file."""
+
+    is_scored: bool
+    """Whether a goal counts as reached only by postures that can be approached."""
+    hindrance: str = ""
+    """Why approaches are not scored, if that is not by request."""
+
+    @property
+    def entry(self) -> dict[str, Any]:
+        """The entry of a file's metadata that records the choice; {} without by request."""
+        if self.is_scored:
+            return {APPROACH: {"tool_speed": TOOL_SPEED}}
+        return {WITHOUT_APPROACH: self.hindrance} if self.hindrance else {}
 
 
-def check_closed_form(problem: Problem) -> None:
-    """Check that the arm has a closed form, and that every goal is a single pose.
+def choose_approach(wanted: bool | None, scenes: Iterable[tuple[Job, Scene]]) -> ApproachChoice:
+    """Return whether goals are scored with their approaches.
+
+    Args:
+        wanted: Whether they should be; None for wherever all of them can be.
+        scenes: The job of each arm or hand, with its scene, whose state is restored.
 
     Raises:
-        ArmClassError: If it has none, or a goal is free.
+        ArmClassError: If they should be and cannot.
     """
-    if problem.freedom.first.size:
-        raise ArmClassError(
-            "approaches are scored for goals of a single pose, but goals of this task are free: "
-            "score it without approach (--no-approach)."
+    if wanted is False:
+        return ApproachChoice(False)
+    hindrance = next(filter(None, (approach_hindrance(job, scene) for job, scene in scenes)), "")
+    if hindrance and wanted:
+        raise ArmClassError(f"{hindrance}. Score the task without approach (--no-approach).")
+    return ApproachChoice(not hindrance, hindrance)
+
+
+def approach_hindrance(job: Job, scene: Scene) -> str:
+    """Return why the approaches of a job's goals cannot be scored, "" if they can be.
+
+    Args:
+        job: The job.
+        scene: Its scene, whose state is restored.
+    """
+    if job.hand.other is not None:
+        return (
+            "approaches are scored for one arm, but goals of this task are reached by two at the "
+            "same time"
         )
-    if is_outside(problem.arm):
-        raise ArmClassError(
-            "approaches are scored for arms of seven joints with a closed form: score this arm "
-            "without approach (--no-approach)."
+    if job.task.has_freedom:
+        return "approaches are scored for goals of a single pose, but goals of this task are free"
+    before = scene.positions()
+    try:
+        scene.set_arm(np.zeros(len(scene.built.arm_joints)))
+        chain, _ = arm_chain(scene)
+    finally:
+        scene.restore(before)
+    if is_outside(any_solver(chain)):
+        return (
+            "approaches are scored for arms of seven joints with a closed form, which "
+            f"'{job.spec.robot.name}' is not"
         )
+    try:
+        job.spec.robot.arm_rates()
+    except RobotError as error:
+        return f"approaches need velocity limits: {error}".removesuffix(".")
+    return ""
 
 
 @dataclass(eq=False)
@@ -108,6 +155,7 @@ class ApproachScorer:
         joints: NDArray[np.float32],
         *,
         jobs: int,
+        first: int = 0,
     ) -> NDArray[np.float32]:
         """Replace the scores of reached pairs by those of their best approachable postures.
 
@@ -117,6 +165,7 @@ class ApproachScorer:
             dexterity: Replaced where another posture is the best, shape (H, G).
             joints: Arm joints of the R reached pairs [rad], shape (R, 7).
             jobs: Number of threads; the scores do not depend on it.
+            first: Flat index of the first of the H configurations.
 
         Returns:
             Arm joints of the pairs that remain reached [rad].
@@ -142,8 +191,8 @@ class ApproachScorer:
             chosen = slice(start, start + SLICE)
             at = rows[chosen], columns[chosen]
             scores = ReachedPairs(
-                pairs[chosen], reason[at], contact[at].astype(np.int32), dexterity[at],
-                joints[chosen].copy(),
+                pairs[chosen] + np.array([first, 0]), reason[at], contact[at].astype(np.int32),
+                dexterity[at], joints[chosen].copy(),
             )  # fmt: skip
             score_approaches(self.problem, self.lines, scores, memory())
             return scores

@@ -13,6 +13,7 @@ from tcs.files.compression import compress
 from tcs.files.mapped import LEAST_BYTES
 from tcs.kernel.problem import build_problem
 from tcs.kernel.sweep import gripper_contacts
+from tcs.placement.scoring.approaches import ApproachScorer, approach_lines, choose_approach
 from tcs.placement.scoring.blocks import BLOCK, Block
 from tcs.placement.scoring.engines import SLICE, Part, Work
 from tcs.placement.scoring.job import Job
@@ -38,7 +39,8 @@ class Estimate:
     blocks: int
     """Files of `--blocks`."""
     scoring_seconds: float
-    """Time of the scoring alone [s], without compiling, sets and approaches."""
+    """Time of the scoring alone [s], with approaches if they are scored, without compiling and
+    sets."""
     scoring_seconds_error: float
     """Standard error of the time from the spread of the slices [s]."""
     memory_bytes: int
@@ -53,23 +55,33 @@ class Estimate:
         return asdict(self)
 
 
-def estimate(job: Job, *, measure: str, jobs: int, slices: int = SAMPLES) -> Estimate:
+def estimate(
+    job: Job, *, measure: str, jobs: int, approach: bool | None = None, slices: int = SAMPLES
+) -> Estimate:
     """Estimate what scoring a job would take.
 
     Args:
         job: The job.
         measure: Name of the dexterity measure.
         jobs: Number of threads; the time is that of one thread divided by it.
+        approach: As for `tcs.score`.
         slices: Greatest number of slices to score.
+
+    Raises:
+        ArmClassError: If `approach` is requested where it cannot be scored.
     """
-    lowered = job.lowered(job.scene())
+    scene = job.scene()
+    choice = choose_approach(approach, [(job, scene)])
+    lowered = job.lowered(scene)
     problem = build_problem(lowered.arrays, lowered.grid, measure)
-    warm_up(problem)
+    scorer = ApproachScorer(problem, approach_lines(job)) if choice.is_scored else None
+    warm_up(problem, approaches=scorer)
     work = Work(problem, gripper_contacts(problem))
     size = job.scored_grid.size
     starts = np.unique(np.linspace(0, max(0, size - SLICE), slices).astype(int))
     scored = [
-        scored_slice(work, Part(start, min(start + SLICE, size))) for start in starts.tolist()
+        scored_slice(work, Part(start, min(start + SLICE, size)), scorer)
+        for start in starts.tolist()
     ]
     return estimate_from(job, scored, jobs=jobs)
 
@@ -86,10 +98,12 @@ class ScoredSlice(NamedTuple):
     """Size of the scores in a file."""
 
 
-def scored_slice(work: Work, part: Part) -> ScoredSlice:
-    """Score a part of a grid and return what it took."""
+def scored_slice(work: Work, part: Part, approaches: ApproachScorer | None = None) -> ScoredSlice:
+    """Score a part of a grid, with approaches if there is a scorer of them; return what it took."""
     begun = time.thread_time()
     block = work.score(part)
+    if approaches is not None:
+        block = block._replace(joints=approaches.score(*block, jobs=1, first=part.start))
     seconds = time.thread_time() - begun
     return ScoredSlice(len(block.reason), seconds, block.joints.nbytes, _stored_bytes(block))
 

@@ -125,6 +125,7 @@ def estimate_all(
     constraints: Constraints,
     now: Mapping[str, float],
     person: PersonLike | None,
+    approach: bool | None = None,
     **_others: Any,
 ) -> list[dict[str, Any]]:
     """Estimate what scoring would take, for one task or, as `score_all_to_files`, for all.
@@ -138,6 +139,7 @@ def estimate_all(
         constraints: As for `tcs.score`; forbidden regions are not subtracted.
         now: As for `tcs.score`.
         person: As for `tcs.score`.
+        approach: As for `tcs.score`.
         **_others: Options of `tcs.score` that change nothing in the estimate.
 
     Raises:
@@ -152,7 +154,9 @@ def estimate_all(
         load_job(name, where, robot, constraints=constraints, now=now, person=person)
         for name, where in pairs
     )
-    return [estimate(job, measure=measure, jobs=jobs).to_json() for job in jobs_of]
+    return [
+        estimate(job, measure=measure, jobs=jobs, approach=approach).to_json() for job in jobs_of
+    ]
 
 
 def saved_summary(path: Path, file: ScoreFile) -> dict[str, Any]:

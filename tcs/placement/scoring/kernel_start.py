@@ -11,7 +11,7 @@ from tcs.kernel.analytic.solver import is_outside
 from tcs.kernel.cache import is_compiled
 from tcs.kernel.problem import Problem
 from tcs.kernel.sweep import gripper_contacts
-from tcs.placement.scoring.approaches import ENTRY, ApproachScorer, check_closed_form
+from tcs.placement.scoring.approaches import ENTRY, ApproachScorer
 from tcs.placement.scoring.engines import Work
 
 ANALYTIC, NUMERIC = "analytic", "numeric"
@@ -40,7 +40,6 @@ class KernelStart:
         """Compile the kernel or load its machine code, unless that was done.
 
         Raises:
-            ArmClassError: If there are approaches, and the arm has no closed form.
             MemoryError: If the address space is limited, and too little is left.
         """
         if not self.is_done:
@@ -63,12 +62,10 @@ def warm_up(
     """Compile the kernel or load its machine code; return the time this took [s].
 
     Raises:
-        ArmClassError: If there are approaches, and the arm has no closed form.
         MemoryError: If the address space is limited, and too little is left.
     """
     entries = [_OF_FEWER.get(problem.joints, _ENTRIES[ik_of(problem)])]
     if approaches is not None:
-        check_closed_form(problem)
         entries.append(ENTRY)
     is_kept = all(map(is_compiled, entries))
     if on_compile is not None and not is_kept:

@@ -50,7 +50,7 @@ class LiveScorer:
         constraints: Constraints = NO_CONSTRAINTS,
         now: Mapping[str, float] | None = None,
         person: PersonLike | None = None,
-        approach: bool = False,
+        approach: bool | None = None,
         **sets: Unpack[SetOptions],
     ) -> None:
         """Load the models, build the scene and compile the kernel.
@@ -80,7 +80,8 @@ class LiveScorer:
         lowered = self._job_at({}).lowered(self._setup.scene)
         self._scene_in_use = threading.Lock()
         problem = build_problem(lowered.arrays, lowered.grid, measure)
-        scorer = ApproachScorer(problem, approach_lines(self.job)) if approach else None
+        is_scored = self._setup.approach.is_scored
+        scorer = ApproachScorer(problem, approach_lines(self.job)) if is_scored else None
         warm_up(problem, on_compile, scorer)
 
     @property
@@ -156,7 +157,7 @@ def score_observed(
     constraints: Constraints = NO_CONSTRAINTS,
     now: Mapping[str, float] | None = None,
     person: PersonLike | None = None,
-    approach: bool = False,
+    approach: bool | None = None,
     **sets: Unpack[SetOptions],
 ) -> ScoreFile:
     """Score a task in the scene as it is observed, on the whole grid of the environment.

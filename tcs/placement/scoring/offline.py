@@ -24,7 +24,7 @@ from tcs.placement.constraints import (
     constraints_entry,
     excluded_configurations,
 )
-from tcs.placement.scoring.approaches import approach_entry, approach_lines
+from tcs.placement.scoring.approaches import ApproachChoice, approach_lines, choose_approach
 from tcs.placement.scoring.arms import score_arms
 from tcs.placement.scoring.engines import ScoringEngine
 from tcs.placement.scoring.hands import check_arms_are_free, score_hands
@@ -39,6 +39,7 @@ from tcs.placement.store import ScoreFile, StateTables
 from tcs.placement.tables import ScoreTable
 
 NO_CONSTRAINTS = Constraints()
+WITHOUT = ApproachChoice(False)
 
 _log = logging.getLogger(__name__)
 
@@ -68,7 +69,7 @@ class ScoringSetup:
     """Name of the dexterity measure."""
     jobs: int = 2
     """Number of threads; the result does not depend on it."""
-    approach: bool = False
+    approach: ApproachChoice = WITHOUT
     """Whether a goal counts as reached only by postures that can be approached."""
     blocks: BlockFolder | None = None
     """Where finished blocks of the grid are kept; None to keep none."""
@@ -85,7 +86,7 @@ class ScoringSetup:
         measure: str,
         jobs: int,
         sets: SetOptions,
-        approach: bool = False,
+        approach: bool | None = None,
         build: Callable[[Job], Scene] = Job.scene,
         **options: Unpack[JobOptions],
     ) -> Self:
@@ -99,13 +100,16 @@ class ScoringSetup:
                 exist.
             DataFileError: If a file cannot be used, or the goals of the task name several hands.
             GridError: If the grid is empty or enormous.
+            ArmClassError: If `approach` is requested where it cannot be scored.
             TcsError: If an option of the sets is out of range.
         """
         dexterity(measure)
         of_sets = checked_options(**sets)
         job = load_job(task, environment, robot, **options)
+        scene = build(job)
+        choice = choose_approach(approach, [(job, scene)])
         references = data_references(job, task, environment, robot)
-        return cls(job, build(job), references, of_sets, measure, jobs, approach)
+        return cls(job, scene, references, of_sets, measure, jobs, choice)
 
     @classmethod
     def load_hands(
@@ -179,7 +183,7 @@ class ScoringSetup:
             on_progress=on_progress,
             on_compile=on_compile,
             excluded=excluded,
-            approaches=approach_lines(job) if self.approach else None,
+            approaches=approach_lines(job) if self.approach.is_scored else None,
             blocks=self.blocks,
             engine=self.engine,
         )
@@ -235,7 +239,7 @@ class ScoringSetup:
                 **({"only": list(job.constraints.only)} if job.constraints.only else {}),
                 **entries,
                 "measure": self.measure,
-                **(approach_entry() if self.approach else {}),
+                **self.approach.entry,
                 "timings": {
                     **entries["timings"],
                     "sets_seconds": done - sets_begun,
@@ -266,7 +270,7 @@ def score(
     constraints: Constraints = NO_CONSTRAINTS,
     now: Mapping[str, float] | None = None,
     person: PersonLike | None = None,
-    approach: bool = False,
+    approach: bool | None = None,
     blocks: BlockFolder | None = None,
     engine: ScoringEngine | None = None,
     **sets: Unpack[SetOptions],
@@ -296,7 +300,10 @@ def score(
             path of a file; by default that of the environment, which without a body of its own has
             that of the papers' average man. Goals on the person are moved to that body.
         approach: Whether a goal counts as reached only by postures that the arm can leave backwards
-            along the goal's approach. The best of these gives joints and dexterity.
+            along the goal's approach. The best of these gives joints and dexterity. By default
+            wherever approaches can be scored: arms of seven joints with a closed form, goals of a
+            single pose that one arm reaches at a time, and known velocity limits. Elsewhere the
+            file records why not (`no_approach`).
         blocks: Folder in which finished blocks of the grid are kept, so that the same call
             continues after the process was killed; see `tcs.placement.scoring.BlockFolder`.
         engine: Who scores: `Threads`, `Processes` or `Dask` of `tcs.placement.scoring.engines`; by
@@ -317,21 +324,28 @@ def score(
         SelectionError: If the present value of an axis to keep is missing or not scored, or every
             base pose is forbidden.
         TcsError: If an option of the sets is out of range, or the workers of the engine are lost.
-        ArmClassError: If `approach` is requested of an arm without a closed form.
+        ArmClassError: If `approach` is requested where it cannot be scored.
         OutputError: If blocks cannot be kept in their folder, or another process is at work there.
     """
     begun = time.perf_counter()
     robots = {"": robot} if arms is None else arm_references(robot, arms)
-    with_hands = {
-        arm: tuple(
-            replace(setup, jobs=jobs, approach=approach, blocks=blocks, engine=engine)
-            for setup in ScoringSetup.load_hands(
-                task, environment, of_arm, measure=measure, sets=sets, only=only,
-                constraints=constraints, now=now, person=person,
-            )
+    loaded = {
+        arm: ScoringSetup.load_hands(
+            task, environment, of_arm, measure=measure, sets=sets, only=only,
+            constraints=constraints, now=now, person=person,
         )
         for arm, of_arm in robots.items()
     }  # fmt: skip
+    choice = choose_approach(
+        approach, ((setup.job, setup.scene) for setups in loaded.values() for setup in setups)
+    )
+    with_hands = {
+        arm: tuple(
+            replace(setup, jobs=jobs, approach=choice, blocks=blocks, engine=engine)
+            for setup in setups
+        )
+        for arm, setups in loaded.items()
+    }
     hands = next(iter(with_hands.values()))
     if len(with_hands) > 1:
         check_arms_are_free(hands)

@@ -8,7 +8,7 @@ from typing import Any
 from tcs.model.grid import Grid
 from tcs.placement.constraints import constraint_texts
 from tcs.placement.scoring.kernel_start import ANALYTIC
-from tcs.placement.store import ScoreFile, state_to_json
+from tcs.placement.store import APPROACH, WITHOUT_APPROACH, ScoreFile, state_to_json
 
 
 def summary(file: ScoreFile) -> dict[str, Any]:
@@ -28,6 +28,7 @@ def summary(file: ScoreFile) -> dict[str, Any]:
         # Files without the entry were solved in closed form.
         "ik": file.metadata.get("ik", ANALYTIC),
         "approach": _approach_summary(file, reasons),
+        "no_approach": file.metadata.get(WITHOUT_APPROACH),
         "configurations": pairs // goals,
         "goals": goals,
         "pairs": pairs,
@@ -62,7 +63,7 @@ def summary(file: ScoreFile) -> dict[str, Any]:
 
 def _approach_summary(file: ScoreFile, reasons: Counter[str]) -> dict[str, Any] | None:
     """Return what scoring with approach found; None for a file scored without."""
-    entry = file.metadata.get("approach")
+    entry = file.metadata.get(APPROACH)
     if entry is None:
         return None
     stopped = [reasons["approach_limits"], reasons["approach_blocked"]]

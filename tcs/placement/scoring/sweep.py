@@ -76,8 +76,8 @@ def sweep(
         on_progress: Called with the number of scored configurations and their total.
         on_compile: Called first, if there is no cached machine code.
         excluded: Configurations that are not scored, shape (configurations,); None for none.
-        approaches: The approaches of the goals, to score approachable postures only; None to score
-            all postures.
+        approaches: The approaches of the goals, to score approachable postures only, for an arm
+            with a closed form and goals of a single pose; None to score all postures.
         blocks: Folder to keep finished blocks of the grid in, and to take them from, without the
             approaches; None to keep none.
         engine: Who scores, without the approaches; None for `jobs` threads of this process.
@@ -88,7 +88,6 @@ def sweep(
     Raises:
         UnknownNameError: If there is no measure of that name.
         TcsError: If `jobs` is less than 1, or the workers of the engine are lost.
-        ArmClassError: If there are approaches, and the arm has no closed form.
         OutputError: If blocks cannot be kept in the folder, another process is at work there, or
             there is no room for a scratch file.
     """

@@ -16,9 +16,11 @@ from tcs.placement.store.motion_file import (
     save_motions,
 )
 from tcs.placement.store.score_file import (
+    APPROACH,
     ARMS,
     HANDS,
     REQUIRED_METADATA,
+    WITHOUT_APPROACH,
     ScoreFile,
     StateTables,
     check_scene,
@@ -26,12 +28,14 @@ from tcs.placement.store.score_file import (
 )
 
 __all__ = [
+    "APPROACH",
     "ARMS",
     "FORMAT",
     "FORMAT_VERSION",
     "HANDS",
     "OF_ARM",
     "REQUIRED_METADATA",
+    "WITHOUT_APPROACH",
     "MotionFile",
     "ScoreFile",
     "StateTables",

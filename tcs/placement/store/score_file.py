@@ -42,6 +42,9 @@ each arm, by its name in the order of the grid."""
 HANDS = "hands"
 """Entry of the metadata of a file whose goals name several hands: of each its arm, tool, goals,
 description of the robot, scene digest and others."""
+APPROACH, WITHOUT_APPROACH = "approach", "no_approach"
+"""Entries of the metadata: how a file was scored with approach, or why it was not where nobody
+decided that."""
 
 MAX_TABLES = 1000
 """Greatest number of observed states in a file; the tables of one take some megabytes."""

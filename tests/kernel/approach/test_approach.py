@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
 
-from tcs.errors import ArmClassError
-from tcs.kernel.analytic.solver import outside_solver
 from tcs.kernel.approach.sweep import ApproachLines, ReachedPairs, approach_spline, score_approaches
 from tcs.kernel.arrays import SPHERE
 from tcs.kernel.contacts import NO_CONTACT
@@ -16,7 +14,6 @@ from tcs.kernel.scores import APPROACH_BLOCKED, APPROACH_LIMITS, REACHED
 from tcs.kernel.verification.reference import link_poses
 from tcs.kernel.verification.reference_motion import least_excess
 from tcs.kernel.verification.reference_pairs import placed_scene
-from tcs.placement.scoring.approaches import check_closed_form
 from tests.kernel.arms import drake_arm
 from tests.kernel.shapes import placed
 from tests.kernel.toy import goal_in_base, scores_of, toy_grid, toy_scene, with_obstacle
@@ -179,9 +176,3 @@ def test_windows_narrower_than_the_columns_are_found(scene, found):
         count += 1
     # The other lines leave the limits between the levels, or another line is found and blocked.
     assert found_again > count / 2 > 5
-
-
-def test_an_arm_without_a_closed_form_is_refused(scene):
-    problem = build_problem(scene, GRID)
-    with pytest.raises(ArmClassError, match="--no-approach"):
-        check_closed_form(problem._replace(arm=outside_solver(scene.chain)))

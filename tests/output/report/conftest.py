@@ -26,7 +26,7 @@ def score_path(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
     environment = write_environment(folder, "small-wheelchair", BESIDE)
     path = folder / "shaving-small-wheelchair-pr2.tcs"
-    file = score("shaving", environment)
+    file = score("shaving", environment, approach=False)
     save_scores(path, robustify(file, sets=12, samples=32))
     return path
 

@@ -23,7 +23,7 @@ OBSTACLES = (
 @pytest.fixture(scope="module")
 def corner(tmp_path_factory):
     path = write_environment(tmp_path_factory.mktemp("blocking"), "corner", CORNER)
-    return score("shaving", path), load_job("shaving", path, "pr2")
+    return score("shaving", path, approach=False), load_job("shaving", path, "pr2")
 
 
 @pytest.fixture(scope="module")

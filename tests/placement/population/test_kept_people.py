@@ -28,7 +28,9 @@ outcomes.BLOCK = 2
 def file(tmp_path_factory):
     """Shaving from a few base poses."""
     return tcs.score(
-        "shaving", write_environment(tmp_path_factory.mktemp("corner"), "corner", CORNER)
+        "shaving",
+        write_environment(tmp_path_factory.mktemp("corner"), "corner", CORNER),
+        approach=False,
     )
 
 

@@ -17,7 +17,7 @@ def small_environment(tmp_path_factory):
 @pytest.fixture(scope="session")
 def small_file(small_environment):
     """Shaving, scored in the small environment."""
-    return score("shaving", small_environment)
+    return score("shaving", small_environment, approach=False)
 
 
 @pytest.fixture(scope="session")

@@ -35,8 +35,8 @@ def corner(tmp_path_factory):
 def singles(corner):
     """The file of each arm, scored by itself."""
     return {
-        "left": score("shaving", corner, "pr2"),
-        "right": score("shaving", corner, "pr2", arms="right"),
+        "left": score("shaving", corner, "pr2", approach=False),
+        "right": score("shaving", corner, "pr2", arms="right", approach=False),
     }
 
 
@@ -44,7 +44,7 @@ def singles(corner):
 def both(corner, tmp_path_factory):
     """The file of both arms, as it is read from disk."""
     path = tmp_path_factory.mktemp("both") / "both.tcs"
-    save_scores(path, score("shaving", corner, "pr2", arms="both"))
+    save_scores(path, score("shaving", corner, "pr2", arms="both", approach=False))
     return load_scores(path)
 
 

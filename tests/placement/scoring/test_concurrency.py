@@ -71,7 +71,9 @@ def test_processes_on_one_file(path, alone):
 
 def test_threads_on_one_live_scorer(tmp_path_factory):
     scorer = LiveScorer(
-        "shaving", write_environment(tmp_path_factory.mktemp("live"), "live", CORNER)
+        "shaving",
+        write_environment(tmp_path_factory.mktemp("live"), "live", CORNER),
+        approach=False,
     )
     observed = [{"person_y": 0.004 * i} for i in range(-8, 8)]
     alone = [digest(scorer.score(one)) for one in observed]

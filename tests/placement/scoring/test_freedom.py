@@ -75,7 +75,8 @@ def test_the_file_says_what_is_free(file):
     assert file.task["goals"][0]["free"] == "any rotation about y"
 
 
-def test_approaches_and_motions_refuse_free_goals_in_a_line(paths):
+def test_approaches_and_motions_refuse_free_goals_in_a_line(file, paths):
+    assert file.metadata["no_approach"].endswith("goals of this task are free")
     with pytest.raises(ArmClassError, match="goals of this task are free"):
         score(*paths, approach=True)
     job = load_job(*paths, "pr2")

@@ -53,7 +53,9 @@ def corner(tmp_path_factory):
 def hands(corner, tmp_path_factory):
     """The scores of goals of three hands, as they are read from disk."""
     folder = tmp_path_factory.mktemp("of_hands")
-    save_scores(folder / "hands.tcs", score(write_task(folder, GOALS), corner, "pr2"))
+    save_scores(
+        folder / "hands.tcs", score(write_task(folder, GOALS), corner, "pr2", approach=False)
+    )
     return load_scores(folder / "hands.tcs")
 
 
@@ -62,7 +64,7 @@ def hands(corner, tmp_path_factory):
 )
 def test_goals_have_the_scores_of_their_hand(hands, corner, tmp_path, robot, goals):
     bare = [{k: v for k, v in GOALS[g].items() if k not in ("arm", "tool")} for g in goals]
-    alone = score(write_task(tmp_path, bare), corner, robot).nominal.scores
+    alone = score(write_task(tmp_path, bare), corner, robot, approach=False).nominal.scores
     scores = hands.nominal.scores
     assert np.count_nonzero(alone.reached)
     np.testing.assert_array_equal(scores.reason[:, goals], alone.reason)
@@ -115,7 +117,7 @@ def test_what_needs_one_hand_refuses_several(hands, corner, tmp_path):
 
 def test_goals_of_one_hand_are_scored_as_with_that_robot(corner, tmp_path):
     task = write_task(tmp_path, [{**BEFORE, "tool": "spoon", "arm": "right"}])
-    file = score(task, corner, "pr2")
+    file = score(task, corner, "pr2", approach=False)
     assert not file.hands
     assert file.robot["name"] == "pr2_right+spoon"
     assert file.metadata["robot"] == "pr2"
@@ -129,7 +131,7 @@ def test_goals_of_one_hand_are_scored_as_with_that_robot(corner, tmp_path):
 def test_contact_is_allowed_to_the_tool_that_a_goal_needs(corner, tmp_path):
     contacts = [["razor", "person::head_center"]]
     task = write_task(tmp_path, GOALS, allowed_contacts=contacts)
-    allowed = score(task, corner, "pr2")
+    allowed = score(task, corner, "pr2", approach=False)
     assert allowed.task["allowed_contacts"] == contacts
     with pytest.raises(UnknownNameError, match="unknown robot body 'rasor'"):
         score(write_task(tmp_path, GOALS, allowed_contacts=[["rasor", contacts[0][1]]]), corner)

@@ -53,6 +53,7 @@ def scored(files):
 
 def test_the_file_records_numeric_ik(scored, tmp_path, capsys):
     assert scored.metadata["ik"] == "numeric"
+    assert "with a closed form" in scored.metadata["no_approach"]
     figures = summary(scored)
     assert figures["ik"] == "numeric"
     path = tmp_path / "bent.tcs"

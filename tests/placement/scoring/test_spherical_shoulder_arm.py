@@ -79,7 +79,7 @@ def test_the_arm_is_solved_in_reverse(files):
 
 def test_drake_confirms_what_is_scored_and_the_dense_scan_finds_little_more(files):
     robot, environment = files
-    file = score("feeding", environment, robot)
+    file = score("feeding", environment, robot, approach=False)
     assert np.count_nonzero(file.nominal.scores.reached) > 100
     found = verify(file, pairs=100, dense=20)
     assert found.checked == 100

@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from tcs.errors import RobotError, TaskError, UnknownNameError
+from tcs.errors import ArmClassError, RobotError, TaskError, UnknownNameError
 from tcs.model.tasks import load_task, partners
 from tcs.output.report.score.pictures import scene_figure
 from tcs.output.report.score.shown_set import ShownSet
@@ -45,6 +45,12 @@ def test_both_goals_are_reached_or_neither(pair):
         left, right = scores.pair_names[scores.pair[h, 0]]
         assert (left[:2], right[:2]) == ("l_", "r_")
         assert scores.pair_names[scores.pair[h, 1]] == (right, left)
+
+
+def test_approaches_of_two_arms_at_once_are_refused(pair, beside, tmp_path):
+    assert "reached by two" in pair.metadata["no_approach"]
+    with pytest.raises(ArmClassError, match="reached by two"):
+        score(write_pair(tmp_path, PAIR), beside, "pr2", approach=True)
 
 
 def test_drake_judges_both_arms_at_once(pair):

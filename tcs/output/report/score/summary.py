@@ -16,13 +16,11 @@ from tcs.output.words import (
     stop_places,
 )
 from tcs.placement.constraints import constraint_texts
-from tcs.placement.store import state_to_json
+from tcs.placement.store import APPROACH, WITHOUT_APPROACH, state_to_json
 from tcs.placement.tables import Reason
 
-LIMITS = (
-    "Each goal is checked by itself in a static scene. The approach to a goal, the path of the arm "
-    "between goals and the path of the base between stops are not checked."
-)
+PATHS = "the path of the arm between goals and the path of the base between stops are not"
+"""What no score file says anything about."""
 
 
 def summary_blocks(report: ScoreReport) -> list[Block]:
@@ -31,7 +29,7 @@ def summary_blocks(report: ScoreReport) -> list[Block]:
     members, goals = len(report.shown.members), report.goals
     if not members:
         text = f"No configuration of the grid reaches any of the {goals} goals."
-        return [Bullets([text, *unreached_everywhere(report), _soundness(report), LIMITS])]
+        return [Bullets([text, *unreached_everywhere(report), _soundness(report), _limits(report)])]
     reached = goals - len(report.unreached)
     stops = ("one base pose", "two base poses", "three base poses")[members - 1]
     items = [
@@ -60,7 +58,7 @@ def summary_blocks(report: ScoreReport) -> list[Block]:
         of_states = f" (one of {tables} states in the file)" if tables > 1 else ""
         items.append(f"The scores are those of the observed state {values}{of_states}.")
     items += _person(report) + _constraints(report) + _success(report)
-    return [Bullets([*items, _soundness(report), LIMITS]), stops_table(report)]
+    return [Bullets([*items, _soundness(report), _limits(report)]), stops_table(report)]
 
 
 def unreached_everywhere(report: ScoreReport) -> list[str]:
@@ -90,6 +88,16 @@ def _constraints(report: ScoreReport) -> list[str]:
     excluded = report.distributions[0].reasons[Reason.EXCLUDED]
     ending = f"; {excluded:,} configurations were excluded and not scored" if excluded else ""
     return [f"Scored under constraints: {'; '.join(texts)}{ending}."]
+
+
+def _limits(report: ScoreReport) -> str:
+    """Return what the scores do not cover."""
+    text = "Each goal is checked by itself in a static scene."
+    if APPROACH in report.file.metadata:
+        return f"{text} Its straight approach is checked; {PATHS}."
+    reason = report.file.metadata.get(WITHOUT_APPROACH)
+    because = "" if reason is None else f" ({reason})"
+    return f"{text} The approach to a goal{because}, {PATHS} checked."
 
 
 def _soundness(report: ScoreReport) -> str:

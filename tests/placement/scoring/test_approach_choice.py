@@ -1,0 +1,99 @@
+"""Whether goals are scored with their approaches: where they can be, unless it is said."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+from tcs.errors import ArmClassError
+from tcs.files.paths import data_folder
+from tcs.model.scene import EMPTY_ENVIRONMENT, Scene, SceneSpec
+from tcs.placement.scoring import LiveScorer, load_job, score, summary
+from tcs.placement.scoring.approaches import approach_hindrance, choose_approach
+from tcs.placement.scoring.dry_run import estimate
+from tcs.placement.tables import Reason
+from tests.environments import CORNER, write_environment
+
+APPROACH = (Reason.APPROACH_LIMITS, Reason.APPROACH_BLOCKED)
+
+
+@pytest.fixture(scope="module")
+def corner(tmp_path_factory):
+    return write_environment(tmp_path_factory.mktemp("choice"), "corner", CORNER)
+
+
+@pytest.fixture(scope="module")
+def by_default(corner):
+    return score("shaving", corner)
+
+
+@pytest.fixture(scope="module")
+def slow_iiwa(tmp_path_factory):
+    """Path of a robot file whose URDF limits no velocity."""
+    folder = tmp_path_factory.mktemp("iiwa")
+    for name in ("iiwa7.urdf", "iiwa7.yaml", "iiwa7_primitives.csv"):
+        shutil.copy(data_folder() / "models" / "robots" / name, folder / name)
+    text = (folder / "iiwa7.urdf").read_text()
+    assert 'velocity="1.710422667"' in text
+    (folder / "iiwa7.urdf").write_text(text.replace(' velocity="1.710422667"', ""))
+    return folder / "iiwa7.yaml"
+
+
+def test_approaches_are_scored_where_they_can_be(by_default, corner):
+    assert by_default.metadata["approach"] == {"tool_speed": 0.1}
+    chosen = score("shaving", corner, approach=True).nominal.scores
+    np.testing.assert_array_equal(by_default.nominal.scores.reason, chosen.reason)
+    without = score("shaving", corner, approach=False)
+    assert not {"approach", "no_approach"} & set(without.metadata)
+    stopped = np.isin(by_default.nominal.scores.reason, APPROACH)
+    assert stopped.any()
+    assert without.nominal.scores.reached[stopped].all()
+
+
+def test_live_scoring_decides_as_offline_scoring(by_default, corner):
+    live = LiveScorer("shaving", corner).score()
+    assert live.metadata["approach"] == by_default.metadata["approach"]
+    np.testing.assert_array_equal(live.nominal.scores.reason, by_default.nominal.scores.reason)
+
+
+def test_all_arms_of_a_file_are_scored_with_approach_or_none(corner):
+    both = score("shaving", corner, arms="both")
+    assert "approach" in both.metadata
+    assert np.isin(both.nominal.scores.reason, APPROACH).any()
+    able, unable = load_job("shaving", corner, "pr2"), load_job("feeding", corner, "stretch")
+    scenes = [(job, job.scene()) for job in (able, unable)]
+    assert choose_approach(None, scenes[:1]).is_scored
+    choice = choose_approach(None, scenes)
+    assert not choice.is_scored
+    assert "'stretch'" in choice.hindrance
+    with pytest.raises(ArmClassError, match="--no-approach"):
+        choose_approach(True, scenes)
+    assert choose_approach(False, scenes).entry == {}
+
+
+def test_unknown_velocity_limits_are_named(slow_iiwa, corner):
+    job = load_job("feeding", corner, slow_iiwa)
+    why = approach_hindrance(job, Scene(SceneSpec(job.spec.robot, EMPTY_ENVIRONMENT)))
+    assert "no velocity limit of 'iiwa_joint_1'" in why
+    assert "velocity_limits" in why
+
+
+def test_the_arm_of_a_scene_stays_where_it_is(corner):
+    job = load_job("shaving", corner, "pr2")
+    scene = job.scene()
+    scene.set_arm(np.full(7, -0.1))
+    before = scene.positions()
+    assert approach_hindrance(job, scene) == ""
+    np.testing.assert_array_equal(scene.positions(), before)
+
+
+def test_a_dry_run_scores_approaches_too(by_default, corner):
+    job = load_job("shaving", corner, "pr2")
+    sizes = [
+        estimate(job, measure="isotropy", jobs=1, approach=approach).memory_bytes
+        for approach in (None, False)
+    ]
+    postures = summary(by_default)["approach"]
+    fewer = postures["limits"] + postures["blocked"]
+    # Seven angles of four bytes for each pair that is reached.
+    assert sizes[1] - sizes[0] == 28 * fewer
