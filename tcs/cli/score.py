@@ -162,10 +162,9 @@ def score(
     kept = options.block_folder(blocks, restart)
     if blocks and (observed or frames):
         raise typer.BadParameter("is not for an observed environment.", param_hint="--blocks")
-    if refine and (approach or dry_run or observed or frames):
+    if refine and (dry_run or observed or frames):
         raise typer.BadParameter(
-            "is for scores without approach, of an environment that is not observed.",
-            param_hint="--refine",
+            "is for scores of an environment that is not observed.", param_hint="--refine"
         )
     if engine != "threads" and (observed or frames or dry_run):
         raise typer.BadParameter(

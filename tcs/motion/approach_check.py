@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -13,14 +13,14 @@ from tcs.kernel.approach.scene import LineScene, approach_scene
 from tcs.kernel.approach.sweep import ApproachLines, approach_spline
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.problem import Problem, build_problem
-from tcs.model.scene import NeighbourList, Scene, goal_poses
+from tcs.model.scene import LoweredScene, NeighbourList, Scene, goal_poses
 from tcs.motion.curves import Curve
 from tcs.motion.recheck import false_pieces
-from tcs.motion.stops import Stop
+from tcs.motion.stops import Stop, single_axes, single_grid
 from tcs.placement.scoring.approaches import approach_lines
 from tcs.placement.scoring.job import Job
-from tcs.placement.scoring.rebuild import rebuild_scene
-from tcs.placement.store import APPROACH, ScoreFile, files_of_arms
+from tcs.placement.scoring.rebuild import rebuild_scenes
+from tcs.placement.store import APPROACH, ScoreFile
 
 LINE_BAR = 1e-3
 """Greatest error of the tool along the line [rad and m]: twice what the kernel allows in the middle
@@ -42,6 +42,8 @@ class ApproachCheck:
     checked: int
     """Number of reached pairs whose approach was re-checked, at postures between which no point of
     the arm moves by more than a millimetre."""
+    refined_checked: int
+    """Number of these that are of refined sets."""
     false: int
     """Number of these whose approach is not found again from the stored posture, leaves the line,
     exceeds limits or is in contact."""
@@ -84,17 +86,36 @@ class ApproachScene:
     """The scene of the certified checks."""
 
     @classmethod
-    def of(cls, file: ScoreFile) -> ApproachScene:
-        """Rebuild the scene of a file of one arm.
+    def of(cls, job: Job, scene: Scene, lowered: LoweredScene) -> Self:
+        """Prepare a job.
+
+        Args:
+            job: The job.
+            scene: Its scene.
+            lowered: The same as arrays.
 
         Raises:
-            StoreMismatchError: If the models differ from those the file was made from.
             RobotError: If a velocity limit is unknown.
         """
-        job, scene, lowered = rebuild_scene(file)
         problem = build_problem(lowered.arrays, lowered.grid)
         neighbours, around = NeighbourList(scene), approach_scene(problem)
         return cls(job, scene, problem, approach_lines(job), neighbours, around)
+
+    def at(self, values: FloatArray, observed: Mapping[str, float]) -> Self:
+        """Return the same with one configuration, on or off the grid.
+
+        Args:
+            values: Value of each axis of the grid [m or rad].
+            observed: State of the observed axes [m or rad].
+        """
+        job = replace(
+            self.job,
+            grid=single_grid(self.job.grid.axes, values.tolist()),
+            observed=single_axes(
+                self.job.observed, [observed[axis.name] for axis in self.job.observed]
+            ),
+        )
+        return self.of(job, self.scene, job.lowered(self.scene))
 
     def check(self, number: int, goal: int, q: FloatArray) -> ApproachFinding | None:
         """Return the finding on the approach of a posture, None if no approach is found from it.
@@ -135,6 +156,19 @@ class ApproachScene:
         return worst
 
 
+class _Stored(NamedTuple):
+    """A stored posture at a goal."""
+
+    table: int
+    arm: int
+    """Number of the arm, 0 in a file of one."""
+    goal: int
+    place: int | FloatArray
+    """Flat index of the configuration among those of its arm, or the values of its axes."""
+    q: FloatArray
+    """Joint angles [rad], shape (7,)."""
+
+
 def check_approaches(
     file: ScoreFile,
     *,
@@ -149,7 +183,7 @@ def check_approaches(
 
     Args:
         file: A score file.
-        pairs: Number of reached pairs.
+        pairs: Number of reached pairs, and as many of refined sets if there are any.
         seed: Seed of the random sample.
         on_progress: Called with the number of checked pairs and their total.
 
@@ -161,32 +195,71 @@ def check_approaches(
         raise TcsError(f"check_approaches: pairs is {pairs}; it may not be negative.")
     if APPROACH not in file.metadata:
         raise TcsError("The file was scored without approach: it has no approaches to check.")
-    files = files_of_arms(file)
-    reached = [
-        (arm, table, int(h), int(g))
-        for arm, of_arm in enumerate(files)
-        for table, tables in enumerate(of_arm.tables)
-        for h, g in np.argwhere(tables.scores.reached)
-    ]
-    drawn = sorted(np.random.default_rng(seed).permutation(len(reached))[:pairs].tolist())
+    random = np.random.default_rng(seed)
+    drawn = [*_drawn(file, pairs, random), *_drawn_refined(file, pairs, random)]
+    scenes = [ApproachScene.of(*built) for built in rebuild_scenes(file)] if drawn else []
     findings: list[ApproachFinding | None] = []
-    scenes: dict[int, ApproachScene] = {}
-    for n in drawn:
-        arm, table, h, g = reached[n]
-        if arm not in scenes:
-            scenes[arm] = ApproachScene.of(files[arm])
-        scores = files[arm].tables[table].scores
-        q = np.asarray(scores.joints_of(h, g), dtype=np.float64)
-        findings.append(scenes[arm].check(table * len(scores.reason) + h, g, q))
+    for stored in drawn:
+        findings.append(_finding(file, scenes, stored))
         if on_progress is not None:
             on_progress(len(findings), len(drawn))
     found = [finding for finding in findings if finding is not None]
     return ApproachCheck(
         checked=len(findings),
+        refined_checked=sum(not isinstance(stored.place, int) for stored in drawn),
         false=sum(finding is None or not finding.is_true for finding in findings),
         max_line_error=max((finding.line_error for finding in found), default=None),
         max_speed=max((finding.speed for finding in found), default=None),
     )
+
+
+def _drawn(file: ScoreFile, pairs: int, random: np.random.Generator) -> Iterator[_Stored]:
+    """Yield random reached pairs of the grid, in their order."""
+    reached = [
+        (table, int(h), int(g))
+        for table, tables in enumerate(file.tables)
+        for h, g in np.argwhere(tables.scores.reached)
+    ]
+    size = file.configurations.arm_size
+    for n in sorted(random.permutation(len(reached))[:pairs].tolist()):
+        table, h, g = reached[n]
+        q = np.asarray(file.tables[table].scores.joints_of(h, g), dtype=np.float64)
+        yield _Stored(table, h // size, g, h % size, q)
+
+
+def _drawn_refined(file: ScoreFile, pairs: int, random: np.random.Generator) -> Iterator[_Stored]:
+    """Yield random goals that members of refined sets reach, in their order."""
+    reached = [
+        (table, *map(int, at))
+        for table, tables in enumerate(file.tables)
+        if tables.refined is not None
+        for at in np.argwhere(tables.refined.reached)
+    ]
+    size = file.configurations.arm_size
+    for n in sorted(random.permutation(len(reached))[:pairs].tolist()):
+        table, row, member, g = reached[n]
+        refined = file.tables[table].refined
+        assert refined is not None
+        q = np.asarray(refined.arm_joints[row, member, g], dtype=np.float64)
+        arm = int(refined.origin[row, member]) // size
+        yield _Stored(table, arm, g, refined.values[row, member], q)
+
+
+def _finding(
+    file: ScoreFile, scenes: Sequence[ApproachScene], stored: _Stored
+) -> ApproachFinding | None:
+    """Return the finding on the approach of a stored posture, given the scene of each arm or hand.
+
+    None if no approach is found from it.
+    """
+    scene, goal = scenes[stored.arm], stored.goal
+    if file.hands:
+        scene = next(scene for scene in scenes if goal in scene.job.goal_numbers)
+        goal = scene.job.goal_numbers.index(goal)
+    if isinstance(stored.place, int):
+        number = stored.table * file.configurations.arm_size + stored.place
+        return scene.check(number, goal, stored.q)
+    return scene.at(stored.place, file.observed_states[stored.table]).check(0, goal, stored.q)
 
 
 def _samples(curve: Curve) -> Iterator[tuple[int, float, FloatArray]]:

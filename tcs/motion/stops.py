@@ -41,11 +41,16 @@ def single_grid(axes: Sequence[Axis], values: Sequence[float]) -> Grid:
         axes: The axes.
         values: Value of each [m or rad].
     """
+    return Grid(single_axes(axes, values))
+
+
+def single_axes(axes: Sequence[Axis], values: Sequence[float]) -> tuple[Axis, ...]:
+    """Return axes with a single value each [m or rad]."""
     single = []
     for axis, value in zip(axes, values, strict=True):
         start = math.degrees(value) if axis.unit == "deg" else value
         single.append(Axis(axis.name, axis.unit, start, 0.0, 1))
-    return Grid(tuple(single))
+    return tuple(single)
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,6 +39,8 @@ def report_evaluation(result: Mapping[str, Any]) -> None:
     widths = ", ".join(f"{joint} {error_width(error)}" for joint, error in result["errors"].items())
     out.print(f"errors  {widths}")
     out.print(f"collisions  {BODY_COLLISIONS[result['body_collisions']]}")
+    if result["approach"]:
+        out.print("a goal counts only if a posture there can be approached, as in the file")
     if result["clipped"]:
         out.print(f"in {result['clipped']:,} samples an error was limited by a joint limit")
     out.print(f"seed {result['seed']}, {result['seconds']:.1f} s")

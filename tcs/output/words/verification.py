@@ -70,6 +70,7 @@ def _approach_lines(found: Mapping[str, Any]) -> tuple[CheckLine, ...]:
         return ()
     lines = (
         CheckLine("approaches re-checked with Drake", f"{checked['checked']:,}"),
+        *_refined_line(checked),
         CheckLine("false", f"{checked['false']:,}", is_detail=True),
     )
     if checked["max_line_error"] is None:

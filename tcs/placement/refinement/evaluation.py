@@ -88,6 +88,7 @@ def evaluate_refined(
         clipped=int(np.count_nonzero(limited)),
         errors=trials.errors,
         body_collisions=trials.body_collisions,
+        approach=trials.with_approach,
         seed=seed,
         seconds=time.perf_counter() - begun - trials.compile_seconds,
         observed=state_to_json(file.observed_axes, trials.observed),

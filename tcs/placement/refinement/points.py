@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
-from tcs.errors import SelectionError
 from tcs.kernel.arrays import BoolArray, FloatArray, GridArrays, IntArray
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.scores import Scores
@@ -18,12 +17,16 @@ from tcs.kernel.sweep import blocked_grippers, gripper_contacts, score_slice
 from tcs.model.grid import ROBOT_AXES, Grid
 from tcs.model.scene import LoweredScene, Scene, environment_at, torso_at
 from tcs.placement.constraints import Footprint
+from tcs.placement.scoring.approaches import ApproachScorer, approach_lines
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.kernel_start import warm_up
 from tcs.placement.scoring.rebuild import rebuild_scene
 from tcs.placement.scoring.sweep import name_contacts
-from tcs.placement.store import ScoreFile, files_of_arms
+from tcs.placement.store import APPROACH, ScoreFile, files_of_arms
 from tcs.placement.tables import Points, Reason, ScoreTable
+
+if TYPE_CHECKING:
+    from tcs.kernel.approach.sweep import ApproachLines
 
 BATCH = 32
 """Configurations that a thread scores at a time: some milliseconds of work."""
@@ -47,13 +50,16 @@ class ScoredArm:
     job: Job
     scene: Scene
     lowered: LoweredScene
+    lines: ApproachLines | None
+    """The approaches of the goals; None to score all postures."""
 
 
 @dataclass(frozen=True, eq=False)
 class PointScorer:
     """One table of a score file, prepared for scoring configurations off its grid.
 
-    The code that scores the grid scores them: at a grid point it gives the stored scores.
+    The code that scores the grid scores them, with approach if it scored the grid so: at a grid
+    point it gives the stored scores.
     Construction builds Drake's plant, which takes half a second.
     """
 
@@ -76,16 +82,15 @@ class PointScorer:
 
         Raises:
             StoreMismatchError: If the file was made from other models.
-            SelectionError: If the file was scored with approach.
+            RobotError: If the file was scored with approach, and a velocity limit is unknown.
         """
-        if "approach" in file.metadata:
-            raise SelectionError(
-                "Configurations off the grid are scored without approach only. Score the task "
-                "again with --no-approach."
-            )
-        arms = tuple(ScoredArm(*rebuild_scene(of_arm)) for of_arm in files_of_arms(file))
+        arms = []
+        for of_arm in files_of_arms(file):
+            job, scene, lowered = rebuild_scene(of_arm)
+            lines = approach_lines(job) if APPROACH in file.metadata else None
+            arms.append(ScoredArm(job, scene, lowered, lines))
         return cls(
-            arms,
+            tuple(arms),
             file.configurations,
             str(file.metadata["measure"]),
             file.observed_states[table],
@@ -101,7 +106,8 @@ class PointScorer:
         """
         for arm in self.arms:
             problem = build_problem(arm.lowered.arrays, arm.lowered.grid, self.measure)
-            warm_up(problem, on_compile)
+            scorer = None if arm.lines is None else ApproachScorer(problem, arm.lines)
+            warm_up(problem, on_compile, scorer)
 
     @property
     def built(self) -> list[tuple[Job, Scene, LoweredScene]]:
@@ -205,6 +211,7 @@ class PointScorer:
         levels, level = np.unique(self._columns(chosen, "torso")[:, 0], return_inverse=True)
         problem = self._problem(arm, states, levels)
         grippers = gripper_contacts(problem)
+        approaches = None if arm.lines is None else ApproachScorer(problem, arm.lines)
         base = self._columns(chosen, "base_x", "base_y", "base_yaw")
         index = state.ravel() * levels.size + level
 
@@ -220,6 +227,8 @@ class PointScorer:
                     found.reason[row], found.contact[row], found.dexterity[row], found.joints[row]
                 )
                 score_slice(at, grippers, int(index[i]), int(index[i]) + 1, part)
+                if approaches is not None:
+                    approaches.score_slice(at, int(index[i]), part)
 
         Parallel(n_jobs=self.jobs, prefer="threads")(
             delayed(score_batch)(start) for start in range(0, rows.size, BATCH)

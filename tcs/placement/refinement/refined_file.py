@@ -128,8 +128,7 @@ def refine(
     Raises:
         StoreMismatchError: If the file was made from other models.
         UnknownNameError: If there is no such objective or choice of collisions.
-        SelectionError: If no configuration reaches a goal, there is no such table, or the file was
-            scored with approach.
+        SelectionError: If no configuration reaches a goal, or there is no such table.
         TcsError: If a number is out of range.
     """
     by_success = objective in BY_SUCCESS

@@ -57,6 +57,8 @@ class Evaluation:
     """Error model of the joints."""
     body_collisions: str
     """Collisions of the robot's body that counted, one of `BODY_COLLISIONS`."""
+    approach: bool
+    """Whether a goal counted as reached only by postures that can be approached, as in the file."""
     seed: int
     """Seed of the samples."""
     seconds: float
@@ -114,6 +116,7 @@ class Evaluation:
             "errors": self.errors.to_json(),
             "clipped": self.clipped,
             "body_collisions": self.body_collisions,
+            "approach": self.approach,
             "seconds": self.seconds,
         }
 
@@ -137,8 +140,9 @@ def evaluate(
     """Return which goals a set of configurations reaches in perturbed environments.
 
     In each sample the joints of the error model are displaced by random errors. A goal is reached
-    if any member of the set has a collision-free solution for it. The initial configurations are
-    unchanged; arm postures are computed again. The same seed gives the same samples for every set.
+    if any member of the set has a collision-free solution for it, that can be approached if the
+    file was scored with approach. The initial configurations are unchanged; arm postures are
+    computed again. The same seed gives the same samples for every set.
 
     Args:
         file: A score file; or its trials, which is faster for repeated evaluation.
@@ -218,6 +222,7 @@ def evaluate(
         clipped=trials.clipped(sets, offsets),
         errors=trials.errors,
         body_collisions=trials.body_collisions,
+        approach=trials.with_approach,
         seed=seed,
         seconds=time.perf_counter() - begun - (trials.compile_seconds - before),
         observed=state_to_json(trials.file.observed_axes, trials.observed),

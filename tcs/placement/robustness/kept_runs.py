@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,22 +16,30 @@ from tcs.model.program import program_digest
 from tcs.model.scene import LoweredScene
 from tcs.placement.robustness.perturbed_scenes import BasePoses, PerturbedScenes, Run
 
+if TYPE_CHECKING:
+    from tcs.kernel.approach.sweep import ApproachLines
+
 PAIRS = 20_000
 """Pairs of configuration and sample of a block: some seconds of work."""
 PROBES = 8
 """States of the environment whose arrays are part of a block's name."""
 
 
-def trials_key(arms: Iterable[tuple[LoweredScene, BoolArray]], measure: str) -> str:
+def trials_key(
+    arms: Iterable[tuple[LoweredScene, BoolArray, ApproachLines | None]], measure: str
+) -> str:
     """Return the hash of what all trials follow from: program, scene and what counts in it.
 
     Args:
-        arms: The scene of each arm as arrays, and the pairs of shapes whose collisions count.
+        arms: The scene of each arm as arrays, the pairs of shapes whose collisions count, and the
+            approaches of the goals if they are scored.
         measure: Name of the dexterity measure.
     """
     sha = hashlib.sha256(f"trials\0{program_digest()}\0{measure}\0".encode())
-    for lowered, pairs in arms:
+    for lowered, pairs, lines in arms:
         sha.update(lowered.digest().encode() + np.packbits(pairs).tobytes())
+        for values in () if lines is None else lines:
+            sha.update(np.asarray(values, dtype="<f8").tobytes())
     return sha.hexdigest()
 
 

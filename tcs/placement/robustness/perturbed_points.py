@@ -20,6 +20,7 @@ from tcs.placement.robustness.displacements import displaced, samples_of
 from tcs.placement.robustness.error_model import Offsets
 from tcs.placement.robustness.perturbed_scenes import BasePoses, PerturbedScenes, Run
 from tcs.placement.robustness.trials import ArmTrials, Trials
+from tcs.placement.scoring.approaches import ApproachScorer
 from tcs.placement.tables import Points, Reason
 
 BATCH = 50
@@ -115,13 +116,13 @@ class PerturbedPoints:
         origin = np.zeros(1)
         grid = GridArrays(len(arrays.goal_p), origin, origin, origin, levels.size)
         robot = build_problem(arrays, grid, str(trials.file.metadata["measure"]))
+        approaches = None if arm.lines is None else ApproachScorer(robot, arm.lines)
         poses = BasePoses(np.zeros(rows.size, dtype=np.int64), x, y, yaw, level)
         axes = trials.grid.environment_axes
         states, state = np.unique(values[:, : len(axes)], axis=0, return_inverse=True)
         for number, at in enumerate(states):
-            scenes = self._scenes(
-                arm, robot, {axis.name: v for axis, v in zip(axes, at.tolist(), strict=True)}
-            )
+            nominal = {axis.name: v for axis, v in zip(axes, at.tolist(), strict=True)}
+            scenes = self._scenes(arm, robot, nominal)._replace(approaches=approaches)
             for i in np.flatnonzero(state.ravel() == number):
                 for start in range(0, self.samples, BATCH):
                     run = Run(int(i), start, min(start + BATCH, self.samples))

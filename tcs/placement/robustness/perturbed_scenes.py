@@ -15,6 +15,7 @@ from tcs.kernel.dexterity import ANY_SOLUTION
 from tcs.kernel.problem import Problem
 from tcs.kernel.scores import Scores
 from tcs.kernel.sweep import score_slice
+from tcs.placement.scoring.approaches import ApproachScorer
 from tcs.placement.tables import Reason
 
 BATCH = 500
@@ -52,6 +53,8 @@ class PerturbedScenes(NamedTuple):
     """Each sample is a state of the environment; the grid has a single base pose, still unset."""
     grippers: IntArray
     """Contacts between gripper and environment at each goal."""
+    approaches: ApproachScorer | None = None
+    """Scores the approaches of the goals; None to score all postures."""
 
     def at_base(self, poses: BasePoses, row: int) -> Problem:
         """Return the problem with the base pose and torso level of a configuration."""
@@ -80,13 +83,19 @@ class PerturbedScenes(NamedTuple):
             joints=np.zeros((*shape, 7), np.float32),
         )
         score_slice(problem, self.grippers, run.start, run.stop, scores)
+        if self.approaches is not None:
+            level = int(poses.torso[run.row])
+            self.approaches.score_slice(problem, run.start, scores, torso=level)
         return scores
 
     def reasons(self, poses: BasePoses, run: Run) -> NDArray[np.uint8]:
         """Return the reason of each sample and goal of one run, shape (stop - start, goals).
 
-        They are those of `scores`, whose search goes on for the best solution.
+        They are those of `scores`, whose search goes on for the best solution. With approach it has
+        to: from another posture some approaches through narrow windows are not found.
         """
+        if self.approaches is not None:
+            return self.scores(poses, run).reason
         problem = self.problem._replace(measure=ANY_SOLUTION)
         return self._replace(problem=problem).scores(poses, run).reason
 

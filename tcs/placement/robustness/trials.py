@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,11 +26,15 @@ from tcs.placement.robustness.displacements import displaced, samples_of
 from tcs.placement.robustness.error_model import ErrorModel, Offsets
 from tcs.placement.robustness.kept_runs import kept_runs, states_digest, trials_key
 from tcs.placement.robustness.perturbed_scenes import BATCH, BasePoses, PerturbedScenes, Run
+from tcs.placement.scoring.approaches import ApproachScorer, approach_lines
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.kernel_start import KernelStart
 from tcs.placement.scoring.rebuild import rebuild_scene
-from tcs.placement.store import ScoreFile, StateTables, files_of_arms
+from tcs.placement.store import APPROACH, ScoreFile, StateTables, files_of_arms
 from tcs.placement.tables import Reason
+
+if TYPE_CHECKING:
+    from tcs.kernel.approach.sweep import ApproachLines
 
 CHUNK = 1000
 """Samples whose environments are held in memory together: some ten megabytes."""
@@ -54,6 +58,8 @@ class ArmTrials:
     body_pairs: BoolArray
     """The pairs of body and environment shapes whose collisions count, shape (n_body,
     n_environment)."""
+    lines: ApproachLines | None = None
+    """The approaches of the goals, if the file was scored with approach."""
 
     def scenes(
         self, positions: Mapping[str, FloatArray], lowered: LoweredScene, measure: str
@@ -71,7 +77,14 @@ class ArmTrials:
         origin = np.zeros(1)
         grid = GridArrays(samples, origin, origin, origin, len(arrays.arm_base_p))
         problem = build_problem(arrays, grid, measure)
-        return PerturbedScenes(problem, gripper_contacts(problem))
+        return PerturbedScenes(problem, gripper_contacts(problem), self.approaches)
+
+    @cached_property
+    def approaches(self) -> ApproachScorer | None:
+        """Scores the approaches of the goals, whatever the state of the environment."""
+        if self.lines is None:
+            return None
+        return ApproachScorer(build_problem(self.lowered.arrays, self.lowered.grid), self.lines)
 
     def arrays_digest(self, positions: Mapping[str, FloatArray]) -> str:
         """Return the hash of the scene with its environment in other states.
@@ -139,11 +152,12 @@ class Trials:
                 f"There is no table {table}; the file has {len(file.tables)}, counted from 0."
             )
         measure = str(file.metadata["measure"])
+        trials = cls.built(file, chosen, built, errors, body_collisions)
         start = KernelStart(
             lambda: (build_problem(lowered.arrays, lowered.grid, measure) for *_, lowered in built),
             on_compile,
+            trials.arms[0].approaches,
         )
-        trials = cls.built(file, chosen, built, errors, body_collisions)
         return dataclasses.replace(trials, start=start)
 
     @classmethod
@@ -165,7 +179,13 @@ class Trials:
             body_collisions: As for `of`.
         """
         arms = tuple(
-            ArmTrials(job, scene, lowered, counted_pairs(scene, lowered, body_collisions))
+            ArmTrials(
+                job,
+                scene,
+                lowered,
+                counted_pairs(scene, lowered, body_collisions),
+                approach_lines(job) if APPROACH in file.metadata else None,
+            )
             for job, scene, lowered in built
         )
         errors_of = ErrorModel.of(built[0][1], errors)
@@ -193,8 +213,13 @@ class Trials:
     @property
     def key(self) -> str:
         """Hash of what the trials of all tables follow from, but for the errors."""
-        arms = ((arm.lowered, arm.body_pairs) for arm in self.arms)
+        arms = ((arm.lowered, arm.body_pairs, arm.lines) for arm in self.arms)
         return trials_key(arms, self._measure)
+
+    @property
+    def with_approach(self) -> bool:
+        """Whether a goal counts as reached only by postures that can be approached."""
+        return self.arms[0].lines is not None
 
     @property
     def scored(self) -> StateTables:
@@ -251,7 +276,8 @@ class Trials:
                 all such pairs.
 
         Returns:
-            Whether a collision-free solution exists, shape (m, samples, goals).
+            Whether a collision-free solution exists, approachable if `with_approach`, shape
+            (m, samples, goals).
 
         Raises:
             GridError: If there is no such configuration.
@@ -292,7 +318,8 @@ class Trials:
             on_progress: Called with the number of samples done and of all samples.
 
         Returns:
-            Whether a collision-free solution exists, shape (samples, goals).
+            Whether a collision-free solution exists, approachable if `with_approach`, shape
+            (samples, goals).
 
         Raises:
             GridError: If there is no such configuration.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -17,12 +17,14 @@ from tcs.errors import ArmClassError, RobotError
 from tcs.files.mapped import chunks
 from tcs.kernel.analytic.solver import any_solver, is_outside
 from tcs.kernel.problem import Problem
+from tcs.kernel.scores import REACHED, Scores
 from tcs.model.scene import Scene, arm_chain
 from tcs.model.tasks import TOOL_SPEED
 from tcs.placement.scoring.job import Job
 from tcs.placement.store import APPROACH, WITHOUT_APPROACH
 
 if TYPE_CHECKING:
+    from tcs.kernel.approach.memory import Approach
     from tcs.kernel.approach.scene import LineScene
     from tcs.kernel.approach.sweep import ApproachLines
 
@@ -125,6 +127,8 @@ class ApproachScorer:
     """The scene, its goals and its grid."""
     lines: ApproachLines
     """The approaches of the goals."""
+    _of_thread: threading.local = field(default_factory=threading.local, repr=False)
+    _arranging: threading.Lock = field(default_factory=threading.Lock, repr=False)
 
     @cached_property
     def scene(self) -> LineScene:
@@ -170,7 +174,6 @@ class ApproachScorer:
         Returns:
             Arm joints of the pairs that remain reached [rad].
         """
-        from tcs.kernel.approach.memory import Approach, new_approach
         from tcs.kernel.approach.sweep import ReachedPairs, score_approaches
 
         found_pairs = (
@@ -178,14 +181,6 @@ class ApproachScorer:
         )
         pairs = np.concatenate([np.empty((0, 2), np.int64), *found_pairs])
         rows, columns = pairs.T
-        scene, of_thread = self.scene, threading.local()
-
-        def memory() -> Approach:
-            """Return the memory of this thread, whose pages take as long as 30 pairs to touch."""
-            if not hasattr(of_thread, "memory"):
-                of_thread.memory = new_approach(self.problem, scene)
-            found: Approach = of_thread.memory
-            return found
 
         def part(start: int) -> ReachedPairs:
             chosen = slice(start, start + SLICE)
@@ -194,7 +189,7 @@ class ApproachScorer:
                 pairs[chosen] + np.array([first, 0]), reason[at], contact[at].astype(np.int32),
                 dexterity[at], joints[chosen].copy(),
             )  # fmt: skip
-            score_approaches(self.problem, self.lines, scores, memory())
+            score_approaches(self.problem, self.lines, scores, self.memory())
             return scores
 
         found = Parallel(n_jobs=jobs, prefer="threads")(
@@ -206,3 +201,42 @@ class ApproachScorer:
         dexterity[rows, columns] = scores.dexterity
         kept: NDArray[np.float32] = scores.joints[scores.reason == 0]
         return kept
+
+    def score_slice(
+        self, problem: Problem, start: int, scores: Scores, *, torso: int | None = None
+    ) -> None:
+        """Replace the scores of consecutive configurations by those with approach, in this thread.
+
+        Args:
+            problem: The problem of this scorer, with its environment in other states, or with
+                another grid of base poses.
+            start: Flat index of the first configuration.
+            scores: Their scores, as `tcs.kernel.sweep.score_slice` fills them.
+            torso: The torso level that is the only one of `problem`; None if it has all of them.
+        """
+        from tcs.kernel.approach.sweep import ReachedPairs, score_approaches
+
+        rows, columns = at = np.nonzero(scores.reason == REACHED)
+        if not rows.size:
+            return
+        memory = self.memory()
+        if torso is not None:
+            memory = memory._replace(moved=memory.moved[torso : torso + 1])
+        pairs = ReachedPairs(
+            np.stack([rows + start, columns], axis=1), scores.reason[at], scores.contact[at],
+            scores.dexterity[at], scores.joints[at],
+        )  # fmt: skip
+        score_approaches(problem, self.lines, pairs, memory)
+        scores.reason[at], scores.contact[at] = pairs.reason, pairs.contact
+        scores.dexterity[at], scores.joints[at] = pairs.dexterity, pairs.joints
+
+    def memory(self) -> Approach:
+        """Return the memory of this thread, whose pages take as long as 30 pairs to touch."""
+        from tcs.kernel.approach.memory import new_approach
+
+        if not hasattr(self._of_thread, "memory"):
+            with self._arranging:
+                scene = self.scene
+            self._of_thread.memory = new_approach(self.problem, scene)
+        found: Approach = self._of_thread.memory
+        return found

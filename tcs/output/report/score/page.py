@@ -24,6 +24,7 @@ from tcs.output.words import (
 )
 from tcs.output.words.robustness import BODY_COLLISIONS, error_width
 from tcs.placement.refinement import refinement_summary
+from tcs.placement.store import APPROACH
 from tcs.placement.tables import SetTable
 
 
@@ -161,7 +162,8 @@ def _success(report: ScoreReport) -> list[Block]:
         Text(
             f"Estimated by tcs {record['program_version']} from up to {record['samples']:,} "
             f"samples, seed {record['seed']}, with errors of {widths}; collisions {collisions}. In "
-            "each sample the configurations are unchanged and the arm postures are computed again."
+            "each sample the configurations are unchanged and the arm postures are computed again"
+            f"{', with their approaches' if APPROACH in report.file.metadata else ''}."
         ),
         table,
     ]
