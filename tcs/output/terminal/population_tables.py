@@ -23,6 +23,8 @@ def report_population(result: Mapping[str, Any]) -> None:
     people = f"{result['bodies']:,} people ({result['women']:,} women)"
     errors = "" if result["errors"] is None else ", each under random errors"
     out.print(f"{people}{errors}; a set serves those for whom it reaches all goals")
+    if result["without_approach"]:
+        out.print("for them a goal counts that a posture reaches, approached or not")
     most = result["sets"][result["serves_most"]]
     out.print(f"set {result['serves_most'] + 1} serves most: {percentage(most['served'])}")
     two = result["two_sets"]

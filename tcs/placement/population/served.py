@@ -20,7 +20,7 @@ from tcs.placement.population.outcomes import Reasons, for_papers_man, reasons_f
 from tcs.placement.robustness.statistics import binomial_interval, mean_of
 from tcs.placement.robustness.trials import Errors, Progress, Trials
 from tcs.placement.selection import Choice, Top, TravelWeights, UtilityWeights, select
-from tcs.placement.store import ScoreFile, state_to_json
+from tcs.placement.store import APPROACH, ScoreFile, state_to_json
 from tcs.placement.tables import Reason, tc_reachability
 
 STREAM = "population"
@@ -95,6 +95,9 @@ class Population:
     """Observed state of the table; angles in degrees under `..._deg` names."""
     about: Mapping[str, str]
     """Names of task, environment and robot."""
+    without_approach: bool
+    """Whether the file was scored with approach: for people a goal counts as reached by any posture
+    nevertheless."""
     errors: Mapping[str, Any] | None
     """Distributions of the joints' errors, None without errors."""
     seed: int
@@ -169,6 +172,7 @@ class Population:
             "serves_most": self.most,
             "two_sets": self._two_to_json(),
             "not_served": self._not_served_to_json(),
+            "without_approach": self.without_approach,
             "errors": self.errors,
             "seed": self.seed,
             "seconds": self.seconds,
@@ -222,8 +226,9 @@ def population(
     """Return which part of a population each of the best sets of a score file serves.
 
     Each person takes the place of the one in the environment: shapes, seat and goals are those of
-    their body. Each member of the sets is scored for each person as `tcs.score` scores it; nothing
-    else on the grid is. A set serves a person if its members reach all goals of the task.
+    their body. Each member of the sets is scored for each person as `tcs.score` scores it, without
+    approach; nothing else on the grid is. A set serves a person if its members reach all goals of
+    the task.
 
     Args:
         file: A score file.
@@ -283,6 +288,7 @@ def population(
             "environment": trials.job.spec.environment.name,
             "robot": trials.job.spec.robot.name,
         },
+        without_approach=APPROACH in file.metadata,
         errors=trials.errors.to_json() if is_perturbed else None,
         seed=seed,
         seconds=time.perf_counter() - begun - trials.compile_seconds,

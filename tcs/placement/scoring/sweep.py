@@ -13,14 +13,15 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from tcs.errors import TcsError
-from tcs.files.blocks import BlockFolder
+from tcs.files.blocks import BlockFolder, Blocks
 from tcs.files.mapped import chunks, large_zeros, release
 from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.sweep import gripper_contacts
 from tcs.model.scene import LoweredScene
+from tcs.placement.scoring.approach_pass import GridScores, score_grid
 from tcs.placement.scoring.approaches import ApproachScorer
-from tcs.placement.scoring.blocks import BLOCK, Block, Kept
+from tcs.placement.scoring.blocks import BLOCK, Block, Kept, key_of
 from tcs.placement.scoring.engines import Part, ScoringEngine, Threads, Work
 from tcs.placement.scoring.engines.work import JOINTS
 from tcs.placement.scoring.kernel_start import KernelStart, ik_of
@@ -78,8 +79,8 @@ def sweep(
         excluded: Configurations that are not scored, shape (configurations,); None for none.
         approaches: The approaches of the goals, to score approachable postures only, for an arm
             with a closed form and goals of a single pose; None to score all postures.
-        blocks: Folder to keep finished blocks of the grid in, and to take them from, without the
-            approaches; None to keep none.
+        blocks: Folder to keep finished blocks of the grid in, and to take them from; None to keep
+            none.
         engine: Who scores, without the approaches; None for `jobs` threads of this process.
 
     Returns:
@@ -125,15 +126,20 @@ def sweep(
                 release(array)
             if on_progress is not None:
                 on_progress(done, size)
-    # Parts are finished in any order.
-    winning = np.concatenate(
-        [np.empty((0, JOINTS), np.float32), *(joints[part] for part in sorted(joints))]
-    )
-    if scorer is not None:
-        start.ensure()
-    approach_begun = time.perf_counter()
-    if scorer is not None:
-        winning = scorer.score(reason, contact, dexterity, winning, jobs=jobs)
+    scores = GridScores(reason, contact, dexterity, joints)
+    approach_begun, compiled = time.perf_counter(), start.seconds
+    if scorer is None:
+        winning = scores.winning
+    else:
+        winning = score_grid(
+            scores,
+            scorer,
+            jobs=jobs,
+            ensure=start.ensure,
+            blocks=blocks,
+            key=lambda: key_of(lowered, measure, excluded),
+            kept_of=lambda opened: _kept(opened, problem),
+        )
     done_at = time.perf_counter()
     names = name_contacts(contact, lowered, problem)
     states = [slice(i * size // tables, (i + 1) * size // tables) for i in range(tables)]
@@ -154,7 +160,7 @@ def sweep(
         start.seconds,
         scoring_seconds=done_at - begun - start.seconds,
         ik=ik_of(problem),
-        approach_seconds=done_at - approach_begun,
+        approach_seconds=done_at - approach_begun - (start.seconds - compiled),
     )
 
 
@@ -182,12 +188,17 @@ def _opened(
         yield None
         return
     manifest = manifest_of()
-    goals = problem.goal_p.shape[1]
     with blocks.opened(manifest.key) as opened:
         manifest.save(opened.folder)
-        kept = Kept(opened, goals=goals, joints=JOINTS, contacts=_codes(problem))
+        kept = _kept(opened, problem)
         shared = None if blocks.restart else Shared.found(blocks.path, manifest, kept)
         yield _Found(kept, shared)
+
+
+def _kept(opened: Blocks, problem: Problem) -> Kept:
+    """Return the blocks of a problem in their folder."""
+    goals = problem.goal_p.shape[1]
+    return Kept(opened, goals=goals, joints=JOINTS, contacts=_codes(problem))
 
 
 def _scored(

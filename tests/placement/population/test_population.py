@@ -77,7 +77,7 @@ def of(*served: list[bool]) -> Population:
     blocked = np.zeros((len(served[0]), 1), dtype=np.bool_)
     return Population(
         people=people, sets=sets, blocked=blocked, goal_names=("",), observed={}, about={},
-        errors=None, seed=0, seconds=0.0,
+        without_approach=False, errors=None, seed=0, seconds=0.0,
     )  # fmt: skip
 
 

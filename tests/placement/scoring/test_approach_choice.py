@@ -6,10 +6,17 @@ import numpy as np
 import pytest
 
 from tcs.errors import ArmClassError
+from tcs.files.blocks import BlockFolder
 from tcs.files.paths import data_folder
 from tcs.model.scene import EMPTY_ENVIRONMENT, Scene, SceneSpec
 from tcs.placement.scoring import LiveScorer, load_job, score, summary
-from tcs.placement.scoring.approaches import approach_hindrance, choose_approach
+from tcs.placement.scoring.approach_pass import approaches_key
+from tcs.placement.scoring.approaches import (
+    ApproachScorer,
+    approach_hindrance,
+    approach_lines,
+    choose_approach,
+)
 from tcs.placement.scoring.dry_run import estimate
 from tcs.placement.tables import Reason
 from tests.environments import CORNER, write_environment
@@ -97,3 +104,28 @@ def test_a_dry_run_scores_approaches_too(by_default, corner):
     fewer = postures["limits"] + postures["blocked"]
     # Seven angles of four bytes for each pair that is reached.
     assert sizes[1] - sizes[0] == 28 * fewer
+
+
+def test_approaches_are_kept_in_blocks(by_default, corner, tmp_path, monkeypatch):
+    folder = BlockFolder(tmp_path / "blocks")
+    first = score("shaving", corner, blocks=folder)
+    monkeypatch.setattr(ApproachScorer, "score", None)
+    again = score("shaving", corner, blocks=folder)
+    for file in (first, again):
+        for name in ("reason", "dexterity", "arm_joints", "pair", "pair_names"):
+            expected = getattr(by_default.nominal.scores, name)
+            np.testing.assert_array_equal(getattr(file.nominal.scores, name), expected)
+    assert again.metadata["timings"]["compile_seconds"] == 0.0
+    # The same scores without approach are there too.
+    without = score("shaving", corner, approach=False, blocks=folder)
+    assert not np.isin(without.nominal.scores.reason, APPROACH).any()
+
+
+def test_other_approaches_have_blocks_of_their_own(corner):
+    lines = approach_lines(load_job("shaving", corner, "pr2"))
+    keys = [
+        approaches_key(scores, of)
+        for scores in ("1", "2")
+        for of in (lines, lines._replace(offset=2.0 * lines.offset))
+    ]
+    assert len({*keys}) == 4
