@@ -35,12 +35,13 @@ def postures(specs):
     """Postures in which surfaces are close, and what shapes alone say far from the chair."""
     rng = np.random.default_rng(0)
     robot = specs[0].robot
+    tables = tables_in_force(robot)
     limits = np.array([robot.joint_limits()[name] for name in robot.arm_joints])
     chosen, wanted = [], {True: 40, False: 15}
     while any(wanted.values()):
         q = rng.uniform(*limits.T)
         at = dict(zip(robot.arm_joints, q, strict=True))
-        bounds = [table.bound(at) for table in tables_in_force(robot)]
+        bounds = [table.bound(at) for table in tables]
         bound = min(bounds, key=lambda b: abs(b - 0.002))
         clear = bound > robot.self_margin
         if wanted[clear] and bound < 0.003:
