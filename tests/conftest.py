@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import typer.main
+import typer.testing
 
 from tcs.model.grid import Grid
 from tcs.model.robots import load_robot
@@ -52,6 +54,16 @@ def _plants_are_built_once():
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(scene_module, "build_plant", functools.lru_cache(maxsize=16)(build_plant))
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _commands_are_built_once():
+    """Share the tree of commands, which takes longer to build than most commands to run."""
+    built = functools.cache(typer.main.get_command)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(typer.main, "get_command", built)
+        patch.setattr(typer.testing, "_get_command", built)
         yield
 
 
