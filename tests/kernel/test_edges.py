@@ -22,15 +22,11 @@ from tcs.kernel.verification.constructed import (
 )
 from tcs.kernel.verification.reference import isotropy, jacobian
 from tcs.placement.scoring import load_job
+from tests.chosen import some_of
 
 ROBOTS = ["pr2", "tiago", "iiwa7", "panda"]
 JOINTS = {"shoulder": SHOULDER, "elbow": ELBOW, "wrist": WRIST}
 SAMPLE = 3
-
-
-def some_of(values, *fast):
-    """Return parameters of which those not in `fast` are slow."""
-    return [v if v in fast else pytest.param(v, marks=pytest.mark.slow) for v in values]
 
 
 AWAY = some_of([0.1, 0.06, 0.01, 0.003, 1e-3], 1e-3)

@@ -30,6 +30,7 @@ from tcs.kernel.verification.reference import (
     shapes_of,
 )
 from tcs.placement.tables import Reason
+from tests.chosen import some_of
 from tests.kernel.judge import ROUNDING, chain_of, compare, is_true, stratified
 from tests.kernel.shapes import placed, rotation, straight_arm
 from tests.kernel.toy import (
@@ -48,9 +49,12 @@ MASKS = ("arm_vs_arm", "arm_vs_body", "arm_vs_environment", "body_vs_environment
 
 # The Panda (even seeds, spherical shoulder) has all eight branches within its limits: the reference
 # takes seconds for a pair there.
-FEW = [(seed, False, 2) for seed in range(2, 8)] + [(seed, True, 2) for seed in (3, 5, 7, 9)]
-MANY = [(seed, False, 6) for seed in range(100, 160)] + [
-    (seed, True, 6 if seed % 2 else 2) for seed in range(100, 130)
+FEW = [(seed, False, 2) for seed in (2, 3, 5)] + [(seed, True, 2) for seed in (3, 5)]
+MANY = [
+    *((seed, False, 2) for seed in (4, 6, 7)),
+    *((seed, True, 2) for seed in (7, 9)),
+    *((seed, False, 6) for seed in range(100, 160)),
+    *((seed, True, 6 if seed % 2 else 2) for seed in range(100, 130)),
 ]
 
 
@@ -67,7 +71,7 @@ def test_the_kernel_agrees_with_the_reference_in_random_scenes(
     compare(scene, grid, scores, stratified(np.random.default_rng(seed), scores.reason, number))
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", some_of(range(3), 2))
 def test_clusters_of_a_body_with_many_shapes_change_no_score(lowered, seed, monkeypatch):
     chain = chain_of(seed, lowered)
     rng, grid = np.random.default_rng(seed), toy_grid()

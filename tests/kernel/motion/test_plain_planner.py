@@ -11,6 +11,7 @@ from tcs.kernel.motion.connect import connect
 from tcs.kernel.motion.edges import NO_PAIR, posture_contact
 from tcs.kernel.motion.trees import new_trees
 from tcs.kernel.verification.reference_motion import is_free_along, least_excess, straight_curve
+from tests.chosen import some_of
 from tests.kernel.arms import drake_arm
 from tests.kernel.motion.plain_planner import plain_path
 from tests.kernel.motion.toys import toy, within_limits
@@ -21,9 +22,7 @@ def chain():
     return drake_arm("pr2 left").chain
 
 
-@pytest.mark.parametrize(
-    "seed", [pytest.param(n, marks=pytest.mark.slow if n != 1 else ()) for n in range(12)]
-)
+@pytest.mark.parametrize("seed", some_of(range(12), 1))
 def test_where_the_plain_planner_finds_a_path_the_compiled_one_does(chain, seed):
     scene, work, plain = toy(chain, seed, obstacles=9)
 
