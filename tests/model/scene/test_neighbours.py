@@ -23,6 +23,13 @@ def neighbours(scene, listed):
     return listed
 
 
+def test_pairs_are_those_that_drake_checks(scene, listed):
+    parts = scene.built.parts
+    ours = {frozenset((parts[a].geometry, parts[b].geometry)) for a, b in listed._pairs}
+    candidates = scene.built.scene_graph.model_inspector().GetCollisionCandidates()
+    assert ours == set(map(frozenset, candidates))
+
+
 def test_contacts_on_a_path_are_those_of_all_pairs(neighbours, rng):
     scene = neighbours.scene
     lower, upper = (np.clip(limit, -3.0, 3.0) for limit in scene.arm_limits)
