@@ -96,8 +96,8 @@ def shape_corners(motion: MotionScene, q: FloatArray) -> FloatArray:
         turn[:, 0, 0], turn[:, 0, 1], turn[:, 1, 0], turn[:, 1, 1] = c, -s, s, c
         turn[:, 2, 2] = 1.0
         R = R @ motion.chain_R[link - 1] @ turn
-        for row in motion.links[motion.link_frame == link]:
-            # Column 1 is the radius of the bounding sphere, columns 2 to 4 are sizes.
-            local = row[5:8] + row[1] * signs
-            corners.append(p[:, None] + np.einsum("nij,kj->nki", R, local))
+        shapes = motion.links[motion.link_frame == link]
+        # Column 1 is the radius of the bounding sphere, columns 2 to 4 are sizes.
+        local = (shapes[:, None, 5:8] + shapes[:, None, 1:2] * signs).reshape(-1, 3)
+        corners.append(p[:, None] + local @ R.transpose(0, 2, 1))
     return np.concatenate(corners, axis=1)
