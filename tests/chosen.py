@@ -9,4 +9,9 @@ import pytest
 
 def some_of(values: Iterable[object], *quick: object) -> list[object]:
     """Return values as parameters of a test; those that are not in `quick` are slow ones."""
-    return [v if v in quick else pytest.param(v, marks=pytest.mark.slow) for v in values]
+    return [value if value in quick else _slow(value) for value in values]
+
+
+def _slow(value: object) -> object:
+    """Return a parameter, or a tuple of several, of a slow test."""
+    return pytest.param(*(value if isinstance(value, tuple) else (value,)), marks=pytest.mark.slow)

@@ -12,6 +12,7 @@ from tcs.files.paths import data_folder
 from tcs.perception import Located, PlanarPose
 
 COARSE = ("--step", 0.1, "--yaw-bins", 8, "--torso-height", 0.15)
+COARSER = ("--step", 0.2, "--yaw-bins", 4, "--torso-height", 0.15)
 
 
 @pytest.fixture(scope="module")
@@ -289,7 +290,7 @@ def test_a_map_stores_the_path_of_the_robot_file(own, tcs_command, tmp_path):
 def test_the_head_option(own, tcs_command, tmp_path):
     robot, _ = own
     out, plain = tmp_path / "own.tcm", tmp_path / "tiago.tcm"
-    ran = tcs_command("capability", "from-ik", "--robot", robot, "--out", out, *COARSE)
+    ran = tcs_command("capability", "from-ik", "--robot", robot, "--out", out, *COARSER)
     assert ran.code == 1
     assert "'mine': no head file ships for it, only for pr2, tiago" in ran.err
     assert ran.err.count("\n") == 1
@@ -299,10 +300,10 @@ def test_the_head_option(own, tcs_command, tmp_path):
     seen = {}
     for name, words in (("mine", ("--robot", robot, "--head", "tiago")), ("tiago", ())):
         path = out if words else plain
-        assert tcs_command("capability", "from-ik", *words, "--out", path, *COARSE).code == 0
+        assert tcs_command("capability", "from-ik", *words, "--out", path, *COARSER).code == 0
         seen[name] = load_map(path).visibility
     np.testing.assert_array_equal(seen["mine"], seen["tiago"])
-    assert tcs_command("capability", "from-ik", "--head", head, "--out", out, *COARSE).code == 0
+    assert tcs_command("capability", "from-ik", "--head", head, "--out", out, *COARSER).code == 0
     # A camera with a narrower view, which changes nothing straight ahead.
     narrow = load_map(out).visibility
     assert (narrow <= seen["tiago"]).all()

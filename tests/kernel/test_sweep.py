@@ -60,7 +60,7 @@ MANY = [
 
 @pytest.mark.parametrize(
     ("seed", "spherical_shoulder", "number"),
-    [*FEW, *(pytest.param(*case, marks=pytest.mark.slow) for case in MANY)],
+    some_of([*FEW, *MANY], *FEW),
 )
 def test_the_kernel_agrees_with_the_reference_in_random_scenes(
     lowered, seed, spherical_shoulder, number

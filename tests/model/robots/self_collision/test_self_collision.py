@@ -25,6 +25,7 @@ from tcs.model.robots.self_collision.clearance import (
 )
 from tcs.model.robots.self_collision.disabled_pairs import neighbouring_pairs, touching_pairs
 from tcs.model.robots.urdf.surfaces import body_triangles, welded_top
+from tests.chosen import some_of
 from tests.model.robots.made_up import urdf
 
 
@@ -123,7 +124,9 @@ def test_samples_stay_within_limits_and_mimic(pr2):
 
 
 # Measured over 2000 postures: 0.85, 0.89, 0.94; four standard errors of 150 are 0.12.
-@pytest.mark.parametrize(("torso", "share"), [(0.0115, 0.85), (0.15, 0.89), (0.3, 0.94)])
+@pytest.mark.parametrize(
+    ("torso", "share"), some_of([(0.0115, 0.85), (0.15, 0.89), (0.3, 0.94)], (0.15, 0.89))
+)
 def test_most_arm_postures_are_free(pr2, judge, arm_bodies, torso, share):
     free = [
         not checked(pr2, judge.touching(q), arm_bodies) for q in postures(pr2, torso, 150, seed=3)
