@@ -13,6 +13,8 @@ from tcs.cli.app import app
 from tcs.errors import TcsError
 from tcs.motion import approach_check, check_approaches
 from tcs.placement.scoring.rebuild import rebuild_scene
+from tests.environments import CORNER, write_environment
+from tests.placement.scoring.test_hands import GOALS, write_task
 
 
 @pytest.fixture(scope="module")
@@ -64,6 +66,14 @@ def test_verify_finds_a_posture_without_approach(claimed, tmp_path):
     assert found["false_reached"] == 0
     assert (found["approaches"]["checked"], found["approaches"]["false"]) == (2, 1)
     assert found["verdict"] == "SOME ANSWERS ARE FALSE"
+
+
+def test_each_hand_is_checked_by_itself(tmp_path):
+    file = tcs.score(write_task(tmp_path, GOALS), write_environment(tmp_path, "corner", CORNER))
+    assert len(file.hands) > 1
+    assert file.nominal.scores.reached.any(axis=0).sum() > 1
+    found = check_approaches(file, pairs=3)
+    assert (found.checked, found.false) == (3, 0)
 
 
 def test_files_without_approaches_are_refused(two_goals):
