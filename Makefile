@@ -14,6 +14,10 @@ PROCESSES ?= 2
 SHARED := --numprocesses=$(PROCESSES) --dist=loadfile --no-loadscope-reorder
 CHOSEN := -m "not slow"
 
+# Modules, and the tests as pytest rewrites them, are compiled once, not in each of the hundreds of
+# processes that the tests start.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo test test-all run-tests lint lock wheel docs format figures benchmark benchmark-robots benchmark-peers \

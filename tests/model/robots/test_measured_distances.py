@@ -215,7 +215,7 @@ def test_a_table_is_measured_as_closely_as_its_cells(rng):
     table = measured_table(pair, load_robot("ur5"), loss)
     assert table.reach == pytest.approx((np.hypot(0.05, 0.05), np.hypot(0.02, 0.02)))
     lost = []
-    for q in rng.uniform(-6.0, 6.0, (1500, 2)):
+    for q in rng.uniform(-6.0, 6.0, (1000, 2)):
         bound = table.bound(dict(zip(table.joints, q, strict=True)))
         distance = pair.distance(*q)
         assert bound <= distance
@@ -227,7 +227,7 @@ def test_a_table_is_measured_as_closely_as_its_cells(rng):
     # None holds more than its corner, also those that were filled in blocks.
     known = np.argwhere(table.corners > 0)
     step = 2.0 * np.pi / np.array(table.corners.shape)
-    for corner in known[rng.permutation(len(known))[:3000]]:
+    for corner in known[rng.permutation(len(known))[:1000]]:
         assert table.corners[tuple(corner)] * UNIT <= pair.distance(*corner * step)
 
 

@@ -156,6 +156,7 @@ def test_baxters_arm_is_checked_against_its_torso_and_pedestal():
             assert frozenset((f"left_{part}", trunk)) not in off
 
 
+@pytest.mark.slow
 def test_baxters_torso_leaves_most_arm_postures_free():
     """Shapes as wide as its handles would forbid twice as many postures."""
     robot = load_robot("baxter")
