@@ -14,6 +14,8 @@ DOCS = Path(__file__).resolve().parents[2] / "docs"
 PAGES = [
     path for path in sorted(DOCS.glob("*.md")) if "```python" in path.read_text(encoding="utf-8")
 ]
+LONG = "refinement", "selection"
+"""Pages whose blocks refine and evaluate sets: with the slow tests."""
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +28,7 @@ def scored(tmp_path_factory):
 
 @pytest.mark.parametrize(
     "page",
-    some_of(PAGES, *(p for p in PAGES if p.stem != "refinement")),
+    some_of(PAGES, *(p for p in PAGES if p.stem not in LONG)),
     ids=lambda page: page.stem,
 )
 def test_blocks_run(page, scored, tmp_path, monkeypatch):
