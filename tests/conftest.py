@@ -25,9 +25,11 @@ FIRST = (
     "kernel/test_sweep.py",
     "model/robots/fitting/test_fitting.py",
     "kernel/test_numeric_sweep.py",
+    "model/robots/fitting/test_splitting.py",
 )
 """Files that `make test` begins with: one process fits shapes while the other compiles the kernel,
-so that neither compiles what the other is compiling."""
+so that neither compiles what the other is compiling. A process is given two files, and the next one
+when it has finished the first: the third and fifth are for the one that fits shapes."""
 
 
 def pytest_collection_modifyitems(items):
