@@ -101,6 +101,7 @@ def test_drakes_tool_is_at_the_goal():
         assert np.all(scores.joints[h, g] <= arm.chain.upper)
 
 
+@pytest.mark.slow
 def test_many_starts_find_little_more(rng):
     reached = missed = scanned = size = 0
     for seed in range(6):

@@ -52,6 +52,7 @@ def problem():
     return build_problem(toy_scene(drake_arm("pr2 left").chain, 3), toy_grid())
 
 
+@pytest.mark.slow
 def test_lines_lead_on_as_where_all_levels_are_filled(problem, rng):
     approach = new_approach(problem, approach_scene(problem))
     complete = straight = ended = 0

@@ -209,6 +209,7 @@ def boxes_on_two_joints():
     )
 
 
+@pytest.mark.slow
 def test_a_table_is_measured_as_closely_as_its_cells(rng):
     loss = 1e-4
     pair = boxes_on_two_joints()

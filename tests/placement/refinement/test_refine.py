@@ -433,12 +433,6 @@ def test_invalid_requests_are_refused(scored, options, error, message):
         tcs.refine(scored, **options)
 
 
-def test_files_scored_with_approach_are_refused(scored):
-    with_approach = dataclasses.replace(scored, metadata={**scored.metadata, "approach": {}})
-    with pytest.raises(SelectionError, match="without approach only"):
-        tcs.refine(with_approach)
-
-
 def test_headings_are_periodic_where_the_grid_covers_them(wheelchair, scored):
     grid = Grid.from_spec(wheelchair.grid)
     space = Space.of(grid, scored.nominal.sets)
