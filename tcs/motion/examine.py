@@ -40,7 +40,7 @@ FIRST_ACCESSES = 3
 """Number of postures with which paths are tried before all postures are searched."""
 FIRST_ITERATIONS = 200
 """Greatest number of random postures that the planner grows towards with each of these."""
-ITERATIONS = 3000
+ITERATIONS = 5000
 """The same with all postures."""
 SLICE = 16
 """Number of configurations that a thread examines at a time."""

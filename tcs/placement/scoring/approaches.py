@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from tcs.kernel.approach.scene import LineScene
     from tcs.kernel.approach.sweep import ApproachLines
 
-SLICE = 256
+SLICE = 512
 """Reached pairs per slice: tens of milliseconds of work."""
 ENTRY = "approach.pairs.approach_pair"
 """Function into which the kernel of approaches is compiled, with its module."""
