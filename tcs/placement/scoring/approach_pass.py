@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from tcs.files.blocks import BlockFolder, Blocks, opened_if
 from tcs.files.mapped import release
+from tcs.placement.scoring import engines
 from tcs.placement.scoring.approaches import ApproachScorer
 from tcs.placement.scoring.blocks import Block, Kept
-from tcs.placement.scoring.engines import Part
 from tcs.placement.scoring.engines.work import JOINTS
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ class GridScores(NamedTuple):
     """Contact codes or -1, shape (H, G)."""
     dexterity: NDArray[np.float32]
     """Dexterity measure, shape (H, G)."""
-    joints: Mapping[Part, NDArray[np.float32]]
+    joints: Mapping[engines.Part, NDArray[np.float32]]
     """Arm joints of the reached pairs of each part of the grid [rad], shapes (reached, 7)."""
 
     @property
