@@ -26,10 +26,12 @@ FIRST = (
     "model/robots/fitting/test_fitting.py",
     "kernel/test_numeric_sweep.py",
     "model/robots/fitting/test_splitting.py",
+    "kernel/approach/test_approach.py",
 )
 """Files that `make test` begins with: one process fits shapes while the other compiles the kernel,
 so that neither compiles what the other is compiling. A process is given two files, and the next one
-when it has finished the first: the third and fifth are for the one that fits shapes."""
+when it has finished the first: the third and fifth are for the one that fits shapes. The sixth
+compiles approaches, before the many files that score with them."""
 
 
 def pytest_collection_modifyitems(items):
