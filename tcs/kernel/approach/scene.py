@@ -61,7 +61,8 @@ def approach_scene(problem: Problem) -> LineScene:
         if np.any(left):
             fixed = first.fixed.copy()
             fixed[problem.environment_body.size :] = problem.body_A[torso, : len(problem.body_body)]
-            needed |= left & needed_pairs(first._replace(fixed=fixed), left)
+            some = with_pairs(first._replace(fixed=fixed), left)
+            needed[left] = needed_pairs(some, np.ones(len(some.pair), np.bool_))
     scene = grouped(with_pairs(first, needed), carriers(problem))
     of_robot = np.concatenate(
         [problem.body_A[:, : len(problem.body_body)], _boxes(problem, scene)], axis=1

@@ -10,7 +10,7 @@ from tcs.kernel.arrays import BOX, CAPSULE, FloatArray, IntArray
 from tcs.kernel.cache import inner, jit
 from tcs.kernel.collide import BOUND, CENTRE, COLUMNS, ROTATION, SIZE, TYPE
 
-LEAST = 8
+LEAST = 3
 """Number of shapes of a link up to which they get no boxes: checking each pair takes no longer."""
 ENCLOSING = 1e-9
 """Excess of the half sizes of boxes around shapes [m], above rounding errors."""
@@ -40,7 +40,7 @@ def boxes_around(links: FloatArray, link_frame: IntArray, body: IntArray) -> Gro
     """
     count = len(links)
     centres = np.ascontiguousarray(links[:, CENTRE : CENTRE + 3])
-    half = _extents(links)
+    half = extents(links)
     roots, parts, frames = [], [np.full((count, 2), NONE)], [link_frame]
     top = count
     for frame in np.unique(link_frame):
@@ -59,7 +59,7 @@ def boxes_around(links: FloatArray, link_frame: IntArray, body: IntArray) -> Gro
     corners[:count, :3], corners[:count, 3:] = centres - half, centres + half
     _enclose(parts_of_all, corners)
     return Groups(
-        rows=np.concatenate([links, _boxes(corners[count:])]),
+        rows=np.concatenate([links, boxes_between(corners[count:])]),
         frame=np.concatenate(frames),
         parts=parts_of_all,
         roots=np.array(roots, np.int64),
@@ -138,7 +138,7 @@ def _enclose(parts: IntArray, corners: FloatArray) -> None:
                 corners[n, 3 + r] = max(corners[parts[n, 0], 3 + r], corners[parts[n, 1], 3 + r])
 
 
-def _extents(rows: FloatArray) -> FloatArray:
+def extents(rows: FloatArray) -> FloatArray:
     """Return how far each shape extends from its centre along the axes of its frame, (n, 3)."""
     size, R = rows[:, SIZE : SIZE + 3], np.abs(rows[:, ROTATION:].reshape(-1, 3, 3))
     of_boxes = np.einsum("nij,nj->ni", R, size)
@@ -147,7 +147,7 @@ def _extents(rows: FloatArray) -> FloatArray:
     return np.where(kind == BOX, of_boxes, np.where(kind == CAPSULE, of_capsules, size[:, :1]))
 
 
-def _boxes(corners: FloatArray) -> FloatArray:
+def boxes_between(corners: FloatArray) -> FloatArray:
     """Return boxes between two corners [m], shape (n, 6), as packed shapes."""
     rows = np.zeros((len(corners), COLUMNS))
     half = (corners[:, 3:] - corners[:, :3]) / 2.0 + ENCLOSING

@@ -1,25 +1,39 @@
-"""Pairs of shapes that the joints between their links never let touch: they are left out."""
+"""Pairs of shapes that the joints between their links never let touch: they are left out.
+
+First, boxes take the place of the shapes beyond the last joint between: they enclose some of these
+shapes whatever its angle. The ranges of the one or two joints that remain are divided into parts
+until each part is certified. Pairs with two joints between that this does not decide are checked in
+the same way by themselves.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from tcs.kernel.arrays import BoolArray
+from tcs.kernel.arrays import BOX, CAPSULE, BoolArray, FloatArray, IntArray
 from tcs.kernel.cache import inner, jit
+from tcs.kernel.collide import CENTRE, ROTATION, SIZE, TYPE
+from tcs.kernel.motion.box_tree import boxes_between, extents
 from tcs.kernel.motion.pairs import is_near, take_posture
 from tcs.kernel.motion.scene import (
     MotionScene,
     MotionWorkspace,
+    moved_shapes,
     new_motion_workspace,
+    pair_fields,
     with_pairs,
 )
 from tcs.kernel.views import unowned
 
 CELLS = 1000
 """Greatest number of parts of the ranges of the joints that are checked for a shape and those of a
-link: pairs that take more are not left out."""
-MOST_BETWEEN = 2
+body: pairs that take more are not left out."""
+DIVIDED = 2
+"""Greatest number of joints whose ranges are divided."""
+MOST_BETWEEN = DIVIDED + 1
 """Number of joints between two shapes up to which their pair is checked."""
+IN_BOX = 16
+"""Number of shapes that one box encloses at any angle of a joint."""
 
 
 def without_idle_pairs(scene: MotionScene) -> MotionScene:
@@ -34,45 +48,140 @@ def needed_pairs(scene: MotionScene, checked: BoolArray) -> BoolArray:
         scene: A scene without groups.
         checked: Which pairs may be left out, shape (n_pairs,).
     """
-    needed = np.empty(len(scene.pair), np.bool_)
-    list_needed(scene, new_motion_workspace(scene), checked, needed)
+    needed = np.ones(len(scene.pair), np.bool_)
+    between = scene.link_frame[scene.pair[:, 0]] - scene.pair[:, 2]
+    which = np.flatnonzero(checked & (between <= MOST_BETWEEN))
+    if which.size:
+        needed[which] = _needed_at_any_angle(scene, which)
+    which = which[needed[which] & (between[which] <= DIVIDED)]
+    if which.size:
+        needed[which] = _needed(with_pairs(scene, which))
     return needed
 
 
-@jit
-def list_needed(
-    owned_scene: MotionScene, owned_work: MotionWorkspace, checked: BoolArray, needed: BoolArray
-) -> None:
-    """Fill which pairs can touch as far as the joints between their shapes decide.
+def _needed(scene: MotionScene) -> BoolArray:
+    """Return which pairs, with DIVIDED joints between their shapes at most, are needed."""
+    needed = np.zeros(len(scene.pair), np.bool_)
+    list_needed(scene, new_motion_workspace(scene), needed)
+    return needed
 
-    If there are one or two, a pair that is certified over their whole ranges never touches.
+
+def _needed_at_any_angle(scene: MotionScene, which: IntArray) -> BoolArray:
+    """Return which pairs may touch if the last joint between their shapes has any angle.
 
     Args:
-        owned_scene: The scene.
+        scene: A scene without groups.
+        which: Numbers of the pairs, shape (n,), which is that of the result.
+    """
+    count, frame = len(scene.links), scene.link_frame
+    first, second = scene.pair[which, :2].T
+    members = np.unique(first)
+    # Body by body, along the axis of the joint of its link.
+    carrier = frame[members] * (scene.body.max() + 1) + scene.body[members]
+    order = np.lexsort((scene.links[members, CENTRE + 2], carrier))
+    members, carrier = members[order], carrier[order]
+    begin = np.flatnonzero(
+        (np.arange(len(order)) - np.searchsorted(carrier, carrier)) % IN_BOX == 0
+    )
+    boxes = _turned_boxes(scene.links[members], begin)
+    link = frame[members[begin]] - 1
+    box_of = np.empty(count, np.int64)
+    box_of[members] = np.repeat(np.arange(len(begin)), np.diff(np.append(begin, len(members))))
+    # The boxes follow the shapes of the arm, on the links before those of their shapes.
+    for f in np.unique(link):
+        boxes[link == f] = moved_shapes(boxes[link == f], scene.chain_R[f], scene.chain_p[f])
+    at = box_of[first], second
+    gap = np.zeros((len(boxes), count + len(scene.fixed)))
+    np.maximum.at(gap, at, scene.gap[which])
+    box, other = np.nonzero(gap)
+    carrying = np.where(other < count, frame[np.minimum(other, count - 1)], 0)
+    pair = np.stack([count + box, other + len(boxes) * (other >= count), carrying], axis=1)
+    links = np.concatenate([scene.links, boxes])
+    of_boxes = scene._replace(
+        links=links,
+        link_frame=np.concatenate([frame, link]),
+        body=np.insert(scene.body, count, scene.body[members[begin]]),
+        # Tables hold at the angle of that joint alone.
+        distances=scene.distances._replace(of_bodies=np.full_like(scene.distances.of_bodies, -1)),
+        root=np.arange(len(links)),
+        **pair_fields(links, scene.fixed, pair, gap[box, other]),
+    )
+    needed = np.zeros(gap.shape, np.bool_)
+    needed[box, other] = _needed(of_boxes)
+    of_pairs: BoolArray = needed[at]
+    return of_pairs
+
+
+def _turned_boxes(rows: FloatArray, begin: IntArray) -> FloatArray:
+    """Return boxes that enclose shapes at any angle of the joint of their link, packed.
+
+    Args:
+        rows: Shapes, packed, in the frames of their links, which turn about z.
+        begin: The first of the shapes in each box, which are consecutive, ascending from 0.
+    """
+    centre, half = rows[:, CENTRE : CENTRE + 3], extents(rows)
+    radius = np.maximum.reduceat(_farthest_from_axis(rows), begin)
+    corners = np.empty((len(begin), 6))
+    corners[:, :2], corners[:, 3:5] = -radius[:, None], radius[:, None]
+    corners[:, 2] = np.minimum.reduceat(centre[:, 2] - half[:, 2], begin)
+    corners[:, 5] = np.maximum.reduceat(centre[:, 2] + half[:, 2], begin)
+    return boxes_between(corners)
+
+
+def _farthest_from_axis(rows: FloatArray) -> FloatArray:
+    """Return the greatest distance of any point of packed shapes from the z axis [m], (n,)."""
+    is_box, is_capsule = rows[:, TYPE] == BOX, rows[:, TYPE] == CAPSULE
+    size, R = rows[:, SIZE : SIZE + 3], rows[:, ROTATION:].reshape(-1, 3, 3)
+    signs = np.stack(np.meshgrid(*3 * [[-1.0, 1.0]]), axis=-1).reshape(-1, 1, 3)
+    # The corners of boxes, and the ends of the segment in a capsule.
+    core = np.where(is_box[:, None], size, is_capsule[:, None] * size[:, 1:2] * [0.0, 0.0, 1.0])
+    points = rows[:, CENTRE : CENTRE + 3] + np.einsum("nij,snj->sni", R, signs * core)
+    away: FloatArray = np.hypot(points[..., 0], points[..., 1]).max(axis=0)
+    return away + np.where(is_box, 0.0, size[:, 0])
+
+
+@jit
+def list_needed(owned_scene: MotionScene, owned_work: MotionWorkspace, needed: BoolArray) -> None:
+    """Fill which pairs can touch as far as the joints between their shapes decide.
+
+    A pair that is certified over their whole ranges never touches.
+
+    Args:
+        owned_scene: The scene; DIVIDED joints are between the shapes of a pair at most.
         owned_work: Scratch.
-        checked: Which pairs to check; the others are needed; shape (n_pairs,).
         needed: Filled, shape (n_pairs,).
     """
     scene, work = unowned(owned_scene), unowned(owned_work)
+    for n in range(7):
+        work.q[n], work.delta[n] = 0.0, 0.0
     first = 0
     while first < len(scene.pair):
         i, base = scene.pair[first, 0], scene.pair[first, 2]
+        body = scene.body[scene.pair[first, 1]]
         last = first + 1
-        while last < len(scene.pair) and scene.pair[last, 0] == i and scene.pair[last, 2] == base:
+        while last < len(scene.pair) and _is_of(scene, last, i, base, body):
             last += 1
-        is_decided = scene.link_frame[i] - base <= MOST_BETWEEN
-        for k in range(first, last):
-            needed[k] = not is_decided or not checked[k]
-        if is_decided:
+        if scene.link_frame[i] == base:
+            take_posture(scene, work)
+            for k in range(first, last):
+                needed[k] = is_near(scene, work, k, False)
+        else:
             _find_needed(scene, work, first, last, needed)
         first = last
+
+
+@inner
+def _is_of(scene: MotionScene, k: int, i: int, base: int, body: int) -> bool:
+    """Return whether pair k is of shape i and one of a body on link `base`."""
+    pair = scene.pair[k]
+    return bool(pair[0] == i and pair[2] == base and scene.body[pair[1]] == body)
 
 
 @inner
 def _find_needed(
     scene: MotionScene, work: MotionWorkspace, begin: int, end: int, needed: BoolArray
 ) -> None:
-    """Fill which of some pairs, of one shape with shapes of one link, are not certified.
+    """Fill which of some pairs, of one shape with shapes of one body, are not certified.
 
     Parts of the ranges of the two joints between the links, or of one, that are not certified for
     all pairs are halved along the joint of the wider one, for those that are left.
@@ -82,25 +191,23 @@ def _find_needed(
         work: Scratch.
         begin: First pair.
         end: One after the last pair.
-        needed: Filled where it is False.
+        needed: Filled.
     """
     span, stretch, pairs, top = work.span, work.stretch, work.pairs, 2
     first, second = scene.pair[begin, 2], scene.link_frame[scene.pair[begin, 0]] - 1
     _take_ranges(scene, work, first, second)
-    count = cells = 0
+    cells = 0
     for k in range(begin, end):
-        if not needed[k]:
-            pairs[count] = k
-            count += 1
-    stretch[0, 0], stretch[0, 1] = 0, count
+        pairs[k - begin], needed[k] = k, False
+    stretch[0, 0], stretch[0, 1] = 0, end - begin
     while top:
         top -= 2
-        cells += 1
         for n in range(2):
             # If both are the same joint, the second part is in force.
             joint, low, high = second if n == 1 else first, span[top + n, 0], span[top + n, 1]
             work.q[joint], work.delta[joint] = 0.5 * (low + high), 0.5 * (high - low)
         take_posture(scene, work)
+        cells += 1
         used = to = stretch[top, 1]
         for m in range(stretch[top, 0], used):
             k = pairs[m]

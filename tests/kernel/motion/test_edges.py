@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
-from tcs.kernel.arrays import BOX, SPHERE
+from tcs.kernel.arrays import BOX
 from tcs.kernel.motion.edges import NO_PAIR, certified, posture_contact
-from tcs.kernel.motion.idle import MOST_BETWEEN, needed_pairs
-from tcs.kernel.motion.scene import motion_scene, new_motion_workspace, with_pairs
-from tcs.kernel.problem import build_problem
 from tcs.kernel.verification.clutter import arm_base
 from tcs.kernel.verification.reference import link_poses
 from tcs.kernel.verification.reference_motion import (
@@ -22,7 +18,7 @@ from tcs.kernel.verification.reference_motion import (
 from tests.kernel.arms import drake_arm
 from tests.kernel.motion.toys import HERE, SWING, bare, prepared, toy, within_limits
 from tests.kernel.shapes import placed
-from tests.kernel.toy import along, toy_grid, toy_scene, with_obstacle
+from tests.kernel.toy import along, toy_grid, with_obstacle
 
 NEAR = 2e-5
 """Clearance beyond the required one below which the certified check may refuse [m]: twice the
@@ -44,35 +40,6 @@ def test_postures_agree_with_the_reference(chain, rng):
         if abs(excess) > 1e-9:
             assert found[-1] == (excess > 0.0), excess
     assert 3 < sum(found) < 23
-
-
-def test_pairs_that_one_or_two_joints_keep_apart_are_left_out(chain, rng):
-    scene = toy_scene(chain, 0, obstacles=30)
-    # The first two shapes turn about the first axes, and each meets a ball on its way.
-    out = np.array([0.35, 0.0, 0.1])
-    R_WA, p_WA = arm_base(scene, toy_grid(), HERE)
-    p = scene.arm.p.copy()
-    p[0, :2] = out
-    arm = scene.arm._replace(frame=np.array([1, 2, 4, 4, 7, 7], np.int8), p=p)
-    scene = scene._replace(arm=arm)
-    for R_AL, p_AL in link_poses(chain, np.array([1.0, 0.6, 0, 0, 0, 0, 0]))[:2]:
-        ball = placed(SPHERE, [0.05, 0, 0], p=R_WA @ (R_AL @ out + p_AL) + p_WA)
-        scene = with_obstacle(scene, ball)
-    every = motion_scene(build_problem(scene, toy_grid()), HERE)
-    needed = needed_pairs(every, np.ones(len(every.pair), np.bool_))
-    joints = every.link_frame[every.pair[:, 0]] - every.pair[:, 2]
-    assert np.all(needed[joints > MOST_BETWEEN])
-    for few in (joints == 1, joints == 2):
-        assert 0 < needed[few].sum() < few.sum()
-    # Pairs that are not to be checked are kept.
-    checked = joints == 1
-    np.testing.assert_array_equal(needed_pairs(every, checked), needed | ~checked)
-    postures = [within_limits(rng, chain) for _ in range(200)]
-    by_joints = [(needed & (joints == n), True) for n in (1, 2)]
-    for kept, touches in ((~needed, False), *by_joints):
-        some = with_pairs(every, kept)
-        work = new_motion_workspace(some)
-        assert any(posture_contact(some, work, q) != NO_PAIR for q in postures) == touches
 
 
 def test_certified_curves_are_free_and_others_blocked_where_it_is_reported(chain, rng):

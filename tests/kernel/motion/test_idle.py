@@ -1,0 +1,99 @@
+"""Pairs that are left out never touch; others are kept."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tcs.kernel.arrays import SPHERE
+from tcs.kernel.distances import DistanceTables
+from tcs.kernel.motion.edges import NO_PAIR, posture_contact
+from tcs.kernel.motion.idle import MOST_BETWEEN, needed_pairs
+from tcs.kernel.motion.scene import motion_scene, new_motion_workspace, with_pairs
+from tcs.kernel.problem import build_problem
+from tcs.kernel.verification.clutter import arm_base
+from tcs.kernel.verification.reference import link_poses
+from tests.kernel.arms import drake_arm
+from tests.kernel.motion.toys import HERE, within_limits
+from tests.kernel.shapes import placed
+from tests.kernel.toy import toy_grid, toy_scene, with_obstacle
+
+OUT = np.array([0.35, 0.0, 0.1])
+"""Where the shapes of the first three links are, in their frames [m]."""
+MET = np.array([1.0, 0.6, 0.5, 0, 0, 0, 0])
+"""A posture at which each of them meets a ball [rad]."""
+SIZE = 16
+"""Number of cells of a full turn of a joint in a table."""
+
+
+@pytest.fixture(scope="module")
+def chain():
+    return drake_arm("pr2 left").chain
+
+
+@pytest.fixture(scope="module")
+def every(chain):
+    """Return a scene whose first three links have a shape each that meets a ball on its way."""
+    scene = toy_scene(chain, 0, obstacles=30)
+    R_WA, p_WA = arm_base(scene, toy_grid(), HERE)
+    p = scene.arm.p.copy()
+    p[0, :3] = OUT
+    frame = np.array([1, 2, 3, 4, 7, 7], np.int8)
+    body = np.array([2, 9, 3, 4, 5, 6], scene.arm.body.dtype)
+    scene = scene._replace(arm=scene.arm._replace(frame=frame, body=body, p=p))
+    for R_AL, p_AL in link_poses(chain, MET)[:3]:
+        ball = placed(SPHERE, [0.05, 0, 0], p=R_WA @ (R_AL @ OUT + p_AL) + p_WA)
+        scene = with_obstacle(scene, ball)
+    return motion_scene(build_problem(scene, toy_grid()), HERE)
+
+
+def joints_between(scene):
+    return scene.link_frame[scene.pair[:, 0]] - scene.pair[:, 2]
+
+
+def all_of(scene):
+    return np.ones(len(scene.pair), np.bool_)
+
+
+def test_pairs_that_up_to_three_joints_keep_apart_are_left_out(chain, every, rng):
+    needed, joints = needed_pairs(every, all_of(every)), joints_between(every)
+    assert np.all(needed[joints > MOST_BETWEEN])
+    numbers = range(1, MOST_BETWEEN + 1)
+    for n in numbers:
+        assert 0 < needed[joints == n].sum() < np.sum(joints == n)
+    postures = [within_limits(rng, chain) for _ in range(500)]
+    by_joints = [(needed & (joints == n), True) for n in numbers]
+    for kept, touches in ((~needed, False), *by_joints):
+        some = with_pairs(every, kept)
+        work = new_motion_workspace(some)
+        assert any(posture_contact(some, work, q) != NO_PAIR for q in postures) == touches
+
+
+def test_pairs_that_are_not_to_be_checked_are_kept(every):
+    needed, checked = needed_pairs(every, all_of(every)), joints_between(every) == 1
+    np.testing.assert_array_equal(needed_pairs(every, checked), needed | ~checked)
+
+
+def test_a_table_that_clears_the_pair_at_one_angle_alone_does_not_leave_it_out(every):
+    # As if the balls were of the robot: the last body of the scene.
+    kept = (joints_between(every) == MOST_BETWEEN) & (every.pair[:, 1] == len(every.body) - 1)
+    ball = every.body.max() + 1
+    scene = with_pairs(every, kept)
+    body = scene.body.copy()
+    body[-1] = ball
+    corners = np.zeros((SIZE, SIZE), np.uint8)
+    # Near the angle 0 of the last joint between, and at no other one.
+    corners[:, [0, 1, -1]] = 255
+    of_bodies = np.full((ball + 1, ball + 1), -1)
+    of_bodies[:, ball - scene.robot] = 0
+    tables = DistanceTables(
+        of_bodies,
+        np.array([[0, 2]]),
+        np.array([[SIZE, SIZE]]),
+        np.zeros((1, 2)),
+        np.zeros(1, np.int64),
+        corners.ravel(),
+    )
+    scene = scene._replace(body=body, distances=tables)
+    assert len(scene.pair) == 1
+    assert np.all(needed_pairs(scene, all_of(scene)))
