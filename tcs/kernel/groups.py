@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.kernel.arrays import BOX, CAPSULE, FloatArray, IntArray
+from tcs.kernel.cache import jit
 from tcs.kernel.collide import BOUND, CENTRE, COLUMNS, ROTATION, ROUNDING, SIZE, TYPE
 
 CLUSTER = 12
@@ -142,13 +143,10 @@ def _box_around(rows: FloatArray) -> FloatArray:
     p = rows[..., CENTRE : CENTRE + 3]
     half = _core(rows[0])
     radius = np.where(rows[0, :, TYPE] == BOX, 0.0, rows[0, :, SIZE])
-    # Of the boxes around all shapes n with each orientation k among theirs; rows are (k, axis).
+    # Of the boxes around all shapes with each orientation k among theirs.
     of = list({R_k.tobytes(): k for k, R_k in enumerate(R[0])}.values())
-    axes = np.swapaxes(R[0, of], 1, 2).reshape(-1, 3)
-    spread = radius + sum(np.abs(axes @ R[0, :, :, j].T) * half[:, j] for j in range(3))
-    middle = axes @ (p[0] - p[0, 0]).T
-    low = (middle - spread).min(axis=1).reshape(-1, 3)
-    high = (middle + spread).max(axis=1).reshape(-1, 3)
+    low, high = np.empty((len(of), 3)), np.empty((len(of), 3))
+    _fill_extents(np.ascontiguousarray(R[0]), p[0] - p[0, 0], half, radius, np.array(of), low, high)
     sizes = (high - low) / 2 + ROUNDING
     k = int(np.argmin(sizes.prod(axis=1)))
     best = np.empty((len(rows), COLUMNS))
@@ -157,6 +155,40 @@ def _box_around(rows: FloatArray) -> FloatArray:
     best[:, CENTRE : CENTRE + 3] = p[:, 0] + R[:, of[k]] @ ((low[k] + high[k]) / 2)
     best[:, ROTATION:] = R[:, of[k]].reshape(-1, 9)
     return best
+
+
+@jit
+def _fill_extents(
+    R: FloatArray,
+    p: FloatArray,
+    half: FloatArray,
+    radius: FloatArray,
+    of: IntArray,
+    low: FloatArray,
+    high: FloatArray,
+) -> None:
+    """Fill the extents of shapes along the axes of some of them [m].
+
+    Args:
+        R: Orientations of the shapes, shape (n, 3, 3).
+        p: Their centres [m], shape (n, 3).
+        half: Half sizes of their cores [m], shape (n, 3).
+        radius: Radii around these [m], shape (n,).
+        of: Numbers of the shapes whose axes are meant, shape (m,).
+        low: Filled, shape (m, 3).
+        high: Filled, shape (m, 3).
+    """
+    for k in range(len(of)):
+        for m in range(3):
+            x, y, z = R[of[k], 0, m], R[of[k], 1, m], R[of[k], 2, m]
+            least, most = np.inf, -np.inf
+            for n in range(len(R)):
+                spread = radius[n]
+                for r in range(3):
+                    spread += half[n, r] * abs(x * R[n, 0, r] + y * R[n, 1, r] + z * R[n, 2, r])
+                middle = x * p[n, 0] + y * p[n, 1] + z * p[n, 2]
+                least, most = min(least, middle - spread), max(most, middle + spread)
+            low[k, m], high[k, m] = least, most
 
 
 def _core(rows: FloatArray) -> FloatArray:
