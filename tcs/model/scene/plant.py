@@ -28,10 +28,11 @@ from pydrake.multibody.tree import (
     RevoluteJoint,
     RigidBody,
 )
-from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.framework import Diagram
 
 from tcs.errors import EnvironmentFileError, RobotError
 from tcs.kernel.arrays import FloatArray
+from tcs.model.diagrams import diagram_builder
 from tcs.model.robots import Primitive, RobotFile, robot_urdf
 from tcs.model.scene.contacts import ContactRule, Group, Part, apply_rule, shape_of
 from tcs.model.scene.environment.environment_file import FLOOR, WORLD
@@ -96,7 +97,7 @@ def build_plant(
 ) -> ScenePlant:
     """Return the finalized plant of a scene; `Scene` documents the arguments and errors."""
     robot, environment = spec.robot, spec.environment
-    builder = DiagramBuilder()
+    builder = diagram_builder()
     # A continuous plant: nothing is simulated, and a time step would only add discrete state.
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
     instance = _add_robot(plant, robot, meshes)

@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
-from pydrake.systems.framework import DiagramBuilder
 from scipy.spatial import cKDTree
 
 from tcs.errors import TaskError, UnknownNameError
 from tcs.files.quantities import GOALS
 from tcs.kernel.arrays import BOX, SPHERE, FloatArray, IntArray
+from tcs.model.diagrams import diagram_builder
 from tcs.model.scene.contacts import shape_of
 from tcs.model.scene.environment.environment_file import WORLD, EnvironmentFile
 from tcs.model.scene.environment.plant import add_environment, environment_parts
@@ -145,7 +145,7 @@ def _goals_on(
 
 def _solids(environment: EnvironmentFile) -> tuple[list[_Solid], dict[str, RigidTransform]]:
     """Return the shapes of an environment in the state of its file, and the poses of its links."""
-    builder = DiagramBuilder()
+    builder = diagram_builder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
     added = add_environment(plant, environment)
     plant.Finalize()

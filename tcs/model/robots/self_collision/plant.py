@@ -24,8 +24,8 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
-from pydrake.systems.framework import DiagramBuilder
 
+from tcs.model.diagrams import diagram_builder
 from tcs.model.robots.extras import robot_urdf
 from tcs.model.robots.primitives import Primitive
 from tcs.model.robots.robot_file import RobotFile
@@ -54,7 +54,7 @@ class SelfCollision:
             RobotError: If the robot's model cannot be used.
         """
         model = robot.model()
-        builder = DiagramBuilder()
+        builder = diagram_builder()
         # A continuous plant: nothing is simulated.
         plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
         Parser(plant).AddModelsFromString(robot_urdf(robot), "urdf")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
-from pydrake.systems.framework import DiagramBuilder
 
 from tcs.kernel.arrays import Shapes
+from tcs.model.diagrams import diagram_builder
 from tcs.model.scene.contacts import shape_of
 from tcs.model.scene.environment.environment_file import EnvironmentFile
 from tcs.model.scene.environment.plant import add_environment, environment_parts
@@ -31,7 +31,7 @@ def named_shapes(environment: EnvironmentFile) -> tuple[tuple[str, ...], Shapes]
         EnvironmentFileError: If a model cannot be used, or a shape is not supported.
         UnknownNameError: If the file names something that does not exist.
     """
-    builder = DiagramBuilder()
+    builder = diagram_builder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
     added = add_environment(plant, environment)
     plant.Finalize()
