@@ -13,6 +13,7 @@ from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.kinematics import copy_joints, link_poses
 from tcs.kernel.numeric.arm import NumericArm
 from tcs.kernel.numeric.curves import correct, point_between, slack_of
+from tcs.kernel.numeric.newton import converge
 from tcs.kernel.numeric.search import (
     LAST_FRACTION,
     SPACING,
@@ -37,6 +38,10 @@ BISECTIONS = 8
 """Bisections of the interval between two contacts, down to SPACING / 256."""
 APPROXIMATE, SOLVED = int_constant(0), int_constant(1)
 """Joint angles interpolated by the cubic; joint angles of a solution."""
+PATIENCE = int_constant(60)
+"""Greatest number of Newton iterations from a candidate where none is a solution after CORRECTIONS.
+At the edge of the workspace J is all but singular along a whole curve, which is then traced to 0.1
+rad only, and Newton's method converges slowly; 10 to 50 are typical."""
 NO_SOLUTION = -2
 """Value in place of a contact: there is no solution within the limits."""
 NOWHERE, TRIED = -1.0, -1.0
@@ -144,6 +149,41 @@ def choose(
             first_contact = contact
         search.measure[top] = TRIED
     return NOWHERE, first_contact
+
+
+@inner
+def choose_far(
+    problem: Problem,
+    arm: NumericArm,
+    work: Workspace,
+    body_A: FloatArray,
+    search: CurveSearch,
+    found: int,
+) -> int:
+    """Fill `best` with the best collision-free solution that lies far from its candidate.
+
+    For goals of which no candidate is a solution: here many Newton iterations start from each.
+
+    Returns:
+        NO_CONTACT if there is a collision-free solution, else the contact of the first solution, or
+        NO_SOLUTION if there is none within the limits.
+    """
+    q, first_contact, value = search.curves.q_now, NO_SOLUTION, -1.0
+    for n in range(found):
+        at = search.at[n]
+        point_between(search.curves, int(at), at - int(at), q)
+        newton = search.curves.newton
+        arrived = converge(arm, work.R_AG, work.p_AG, q, newton, PATIENCE, EXACT)
+        if not arrived or slack_of(arm, q) < 0.0:
+            continue
+        turn_into_limits(problem, q)
+        contact = arm_contact(problem, work, body_A, q)
+        if contact != NO_CONTACT:
+            first_contact = contact if first_contact == NO_SOLUTION else first_contact
+        elif at_goal(problem, work) and measure_at(problem, q) > value:
+            value = measure_at(problem, q)
+            copy_joints(q, search.best)
+    return NO_CONTACT if value >= 0.0 else first_contact
 
 
 @inner
@@ -257,7 +297,10 @@ def score_pair(
         return JOINT_LIMITS, NO_CONTACT
     at, contact = choose(problem, arm, work, body_A, search, found)
     if at == NOWHERE and contact == NO_SOLUTION:
-        return JOINT_LIMITS, NO_CONTACT
+        contact = choose_far(problem, arm, work, body_A, search, found)
+        if contact == NO_SOLUTION:
+            return JOINT_LIMITS, NO_CONTACT
+        return (REACHED if contact == NO_CONTACT else ARM_BLOCKED), contact
     if at == NOWHERE:
         at = bisect_contacts(problem, arm, work, body_A, search, found)
     if at == NOWHERE:
