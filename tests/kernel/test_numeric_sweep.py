@@ -25,6 +25,7 @@ from tcs.kernel.scores import (
 )
 from tcs.kernel.verification.dense import dense_scan
 from tcs.kernel.verification.reference import isotropy, jacobian
+from tcs.placement.scoring import load_job
 from tests.kernel.arms import drake_arm
 from tests.kernel.judge import chain_of, is_true
 from tests.kernel.shapes import offset_arm, random_arm
@@ -74,6 +75,21 @@ def test_numeric_ik_reaches_what_the_closed_form_reaches_in_the_real_scene(lower
     assert np.sum(reached & (numeric.reason != REACHED)) <= 1
     short = (closed.dexterity - numeric.dexterity)[reached & (numeric.reason == REACHED)]
     assert np.mean(np.abs(short)) < 1e-3
+
+
+def test_goals_at_the_edge_of_the_workspace_are_reached():
+    job = load_job("scratching_thigh_left", "bed", "baxter")
+    lowered = job.lowered(job.scene())
+    grid = lowered.grid
+    axes = grid.base_x, grid.base_y, grid.base_yaw
+    sizes = grid.environment_states, *map(len, axes), grid.torso_levels
+    state, x, y, yaw, torso = np.unravel_index(106321, sizes)
+    place = grid._replace(base_x=axes[0][[x]], base_y=axes[1][[y]], base_yaw=axes[2][[yaw]])
+    found = scores_of(lowered.arrays, place)
+    h, g = state * grid.torso_levels + torso, 0
+    # The elbow is at 0.2 rad, and J all but singular, along all of the curve that is traced.
+    assert found.reason[h, g] == REACHED
+    assert is_true(lowered.arrays, place, h, g, found.joints[h, g])
 
 
 @pytest.mark.parametrize("seed", range(6))
