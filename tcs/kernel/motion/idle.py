@@ -8,12 +8,14 @@ the same way by themselves.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from tcs.kernel.arrays import BOX, CAPSULE, BoolArray, FloatArray, IntArray
 from tcs.kernel.cache import inner, jit
 from tcs.kernel.collide import CENTRE, ROTATION, SIZE, TYPE
-from tcs.kernel.motion.box_tree import boxes_between, extents
+from tcs.kernel.motion.box_tree import NONE, boxes_between, extents
 from tcs.kernel.motion.pairs import is_near, take_posture
 from tcs.kernel.motion.scene import (
     MotionScene,
@@ -66,6 +68,19 @@ def _needed(scene: MotionScene) -> BoolArray:
     return needed
 
 
+class _Boxes(NamedTuple):
+    """Boxes that take the place of shapes of the arm, each on the link before theirs."""
+
+    rows: FloatArray
+    """Packed, in the frames of these links, shape (n, 17)."""
+    link: IntArray
+    """Link of each, shape (n,)."""
+    body: IntArray
+    """Body of the shapes in each, shape (n,)."""
+    of_shape: IntArray
+    """Number of the box of each shape of the arm that has one, shape (n_arm,)."""
+
+
 def _needed_at_any_angle(scene: MotionScene, which: IntArray) -> BoolArray:
     """Return which pairs may touch if the last joint between their shapes has any angle.
 
@@ -75,32 +90,20 @@ def _needed_at_any_angle(scene: MotionScene, which: IntArray) -> BoolArray:
     """
     count, frame = len(scene.links), scene.link_frame
     first, second = scene.pair[which, :2].T
-    members = np.unique(first)
-    # Body by body, along the axis of the joint of its link.
-    carrier = frame[members] * (scene.body.max() + 1) + scene.body[members]
-    order = np.lexsort((scene.links[members, CENTRE + 2], carrier))
-    members, carrier = members[order], carrier[order]
-    begin = np.flatnonzero(
-        (np.arange(len(order)) - np.searchsorted(carrier, carrier)) % IN_BOX == 0
-    )
-    boxes = _turned_boxes(scene.links[members], begin)
-    link = frame[members[begin]] - 1
-    box_of = np.empty(count, np.int64)
-    box_of[members] = np.repeat(np.arange(len(begin)), np.diff(np.append(begin, len(members))))
-    # The boxes follow the shapes of the arm, on the links before those of their shapes.
-    for f in np.unique(link):
-        boxes[link == f] = moved_shapes(boxes[link == f], scene.chain_R[f], scene.chain_p[f])
-    at = box_of[first], second
-    gap = np.zeros((len(boxes), count + len(scene.fixed)))
+    boxes = _boxes_at_any_angle(scene, np.unique(first))
+    added = len(boxes.rows)
+    at = boxes.of_shape[first], second
+    gap = np.zeros((added, count + len(scene.fixed)))
     np.maximum.at(gap, at, scene.gap[which])
     box, other = np.nonzero(gap)
     carrying = np.where(other < count, frame[np.minimum(other, count - 1)], 0)
-    pair = np.stack([count + box, other + len(boxes) * (other >= count), carrying], axis=1)
-    links = np.concatenate([scene.links, boxes])
+    # The boxes come after the shapes of the arm.
+    pair = np.stack([count + box, other + added * (other >= count), carrying], axis=1)
+    links = np.concatenate([scene.links, boxes.rows])
     of_boxes = scene._replace(
         links=links,
-        link_frame=np.concatenate([frame, link]),
-        body=np.insert(scene.body, count, scene.body[members[begin]]),
+        link_frame=np.concatenate([frame, boxes.link]),
+        body=np.insert(scene.body, count, boxes.body),
         # Tables hold at the angle of that joint alone.
         distances=scene.distances._replace(of_bodies=np.full_like(scene.distances.of_bodies, -1)),
         root=np.arange(len(links)),
@@ -110,6 +113,24 @@ def _needed_at_any_angle(scene: MotionScene, which: IntArray) -> BoolArray:
     needed[box, other] = _needed(of_boxes)
     of_pairs: BoolArray = needed[at]
     return of_pairs
+
+
+def _boxes_at_any_angle(scene: MotionScene, members: IntArray) -> _Boxes:
+    """Return boxes that enclose shapes of the arm, `members`, at any angle of their link's joint.
+
+    They enclose shapes of one body each that are beside each other along the axis of the joint.
+    """
+    carrier = scene.link_frame[members] * (scene.body.max() + 1) + scene.body[members]
+    order = np.lexsort((scene.links[members, CENTRE + 2], carrier))
+    members, carrier = members[order], carrier[order]
+    place = np.arange(len(members)) - np.searchsorted(carrier, carrier)
+    begin = np.flatnonzero(place % IN_BOX == 0)
+    rows, link = _turned_boxes(scene.links[members], begin), scene.link_frame[members[begin]] - 1
+    for f in np.unique(link):
+        rows[link == f] = moved_shapes(rows[link == f], scene.chain_R[f], scene.chain_p[f])
+    of_shape = np.full(len(scene.links), NONE)
+    of_shape[members] = np.repeat(np.arange(len(begin)), np.diff(np.append(begin, len(members))))
+    return _Boxes(rows, link, scene.body[members[begin]], of_shape)
 
 
 def _turned_boxes(rows: FloatArray, begin: IntArray) -> FloatArray:

@@ -277,8 +277,8 @@ def carriers(problem: Problem) -> IntArray:
     return np.concatenate([np.full(problem.environment_body.size, -1), problem.body_mount])
 
 
-def with_pairs(scene: MotionScene, kept: BoolArray) -> MotionScene:
-    """Return a scene with some of its pairs only, those `kept`, shape (n_pairs,)."""
+def with_pairs(scene: MotionScene, kept: BoolArray | IntArray) -> MotionScene:
+    """Return a scene with some of its pairs only, those `kept`: a mask or ascending numbers."""
     fields = pair_fields(scene.links, scene.fixed, scene.pair[kept], scene.gap[kept])
     return scene._replace(**fields)
 
