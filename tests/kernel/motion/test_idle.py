@@ -31,20 +31,25 @@ def chain():
     return drake_arm("pr2 left").chain
 
 
-@pytest.fixture(scope="module")
-def every(chain):
-    """Return a scene whose first three links have a shape each that meets a ball on its way."""
+def with_shapes(chain, frame, body, places):
+    """Return a scene whose first three shapes are on given links; three balls are on their way."""
     scene = toy_scene(chain, 0, obstacles=30)
     R_WA, p_WA = arm_base(scene, toy_grid(), HERE)
     p = scene.arm.p.copy()
-    p[0, :3] = OUT
-    frame = np.array([1, 2, 3, 4, 7, 7], np.int8)
-    body = np.array([2, 9, 3, 4, 5, 6], scene.arm.body.dtype)
-    scene = scene._replace(arm=scene.arm._replace(frame=frame, body=body, p=p))
+    p[0, :3] = places
+    frames = np.array([*frame, 4, 7, 7], np.int8)
+    bodies = np.array([*body, 4, 5, 6], scene.arm.body.dtype)
+    scene = scene._replace(arm=scene.arm._replace(frame=frames, body=bodies, p=p))
     for R_AL, p_AL in link_poses(chain, MET)[:3]:
         ball = placed(SPHERE, [0.05, 0, 0], p=R_WA @ (R_AL @ OUT + p_AL) + p_WA)
         scene = with_obstacle(scene, ball)
     return motion_scene(build_problem(scene, toy_grid()), HERE)
+
+
+@pytest.fixture(scope="module")
+def every(chain):
+    """Return a scene whose first three links have a shape each that meets a ball on its way."""
+    return with_shapes(chain, (1, 2, 3), (2, 9, 3), OUT)
 
 
 def joints_between(scene):
@@ -67,6 +72,16 @@ def test_pairs_that_up_to_three_joints_keep_apart_are_left_out(chain, every, rng
         some = with_pairs(every, kept)
         work = new_motion_workspace(some)
         assert any(posture_contact(some, work, q) != NO_PAIR for q in postures) == touches
+
+
+def test_one_box_around_several_shapes_encloses_each_of_them(chain):
+    # The one that is farthest from the axis comes last along it.
+    places = [[0.0, 0.0, 0.0], [0.05, 0.0, 0.02], OUT]
+    scene = with_shapes(chain, (3, 3, 3), (3, 3, 3), places)
+    needed, turned = needed_pairs(scene, all_of(scene)), joints_between(scene) == MOST_BETWEEN
+    for kept, touches in ((~needed, False), (needed & turned, True)):
+        some = with_pairs(scene, kept)
+        assert (posture_contact(some, new_motion_workspace(some), MET) != NO_PAIR) == touches
 
 
 def test_pairs_that_are_not_to_be_checked_are_kept(every):
