@@ -55,7 +55,7 @@ def _plants_are_built_once():
     """Share finalized plants, which nothing changes, between the scenes of one specification.
 
     A plant takes most of the time that a scene does; each scene has a context of its own. Those of
-    the latest specifications only: a plant holds 40 to 80 MB.
+    the latest specifications only: a plant in which contacts were sought holds 100 MB.
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(scene_module, "build_plant", functools.lru_cache(maxsize=8)(build_plant))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -11,10 +10,7 @@ import numpy as np
 from pydrake.geometry import (
     Box,
     Capsule,
-    CollisionFilterDeclaration,
     GeometryId,
-    GeometrySet,
-    SceneGraph,
     SceneGraphInspector,
     Sphere,
 )
@@ -130,36 +126,20 @@ class ContactRule:
 
     def checked(self, first: list[Part], second: list[Part]) -> BoolArray:
         """Return which pairs of parts are checked, shape (first, second)."""
-        row_of, rows = _kinds(first)
-        column_of, columns = _kinds(second)
+        row_of, rows = kinds_of(first)
+        column_of, columns = kinds_of(second)
         of_kinds = [[self.is_checked(a, b) for b in columns] for a in rows]
         table = np.array(of_kinds, dtype=np.bool_).reshape(len(rows), len(columns))
         return table[np.ix_(row_of, column_of)]
 
 
-def _kinds(parts: Sequence[Part]) -> tuple[list[int], list[Part]]:
+def kinds_of(parts: Sequence[Part]) -> tuple[list[int], list[Part]]:
     """Return for each part the number of its kind, and the first part of each kind."""
     first_of: dict[tuple[Group, int, str], Part] = {}
     for part in parts:
         first_of.setdefault(part.kind, part)
     number = {kind: i for i, kind in enumerate(first_of)}
     return [number[part.kind] for part in parts], list(first_of.values())
-
-
-def apply_rule(scene_graph: SceneGraph, parts: tuple[Part, ...], rule: ContactRule) -> None:
-    """Make Drake check exactly the pairs of the rule."""
-    everything = GeometrySet([part.geometry for part in parts])
-    declaration = CollisionFilterDeclaration().ExcludeWithin(everything)
-    number_of, kinds = _kinds(parts)
-    geometries = defaultdict(list)
-    for part, number in zip(parts, number_of, strict=True):
-        geometries[number].append(part.geometry)
-    for i, kind in enumerate(kinds):
-        others = range(i + 1, len(kinds))
-        partners = [g for j in others if rule.is_checked(kind, kinds[j]) for g in geometries[j]]
-        if partners:
-            declaration.AllowBetween(GeometrySet(geometries[i]), GeometrySet(partners))
-    scene_graph.collision_filter_manager().Apply(declaration)
 
 
 def shape_of(inspector: SceneGraphInspector, part: Part) -> tuple[int, tuple[float, float, float]]:

@@ -181,7 +181,6 @@ def arm_chain(scene: Scene) -> tuple[Chain, list[RigidTransform]]:
 
 def _arm_poses(scene: Scene, parts: list[Part], X_AL: list[RigidTransform]) -> list[RigidTransform]:
     """Return the poses of the arm's shapes in the link frames that carry them."""
-    query = scene.query_object()
     X_WA = scene.built.arm_base_frame.CalcPoseInWorld(scene.plant_context)
     joints = scene.built.coupled_joints
     # With all joints at zero, links between coupled joints have the frame of their joint's link.
@@ -190,7 +189,7 @@ def _arm_poses(scene: Scene, parts: list[Part], X_AL: list[RigidTransform]) -> l
     poses = []
     for part in parts:
         X_WL = X_WA @ frames[part.carrier - 1]
-        poses.append(X_WL.inverse() @ query.GetPoseInWorld(part.geometry))
+        poses.append(X_WL.inverse() @ scene.shape_pose(part))
     return poses
 
 

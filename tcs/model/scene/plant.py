@@ -11,7 +11,7 @@ from pydrake.geometry import (
     Box,
     Capsule,
     GeometryId,
-    ProximityProperties,
+    GeometryInstance,
     SceneGraph,
     SceneGraphInspector,
     Shape,
@@ -34,7 +34,8 @@ from tcs.errors import EnvironmentFileError, RobotError
 from tcs.kernel.arrays import FloatArray
 from tcs.model.diagrams import diagram_builder
 from tcs.model.robots import Primitive, RobotFile, robot_urdf
-from tcs.model.scene.contacts import ContactRule, Group, Part, apply_rule, shape_of
+from tcs.model.scene.contacts import ContactRule, Group, Part, shape_of
+from tcs.model.scene.drake_contacts import DrakeContacts
 from tcs.model.scene.environment.environment_file import FLOOR, WORLD
 from tcs.model.scene.environment.joints import EnvironmentJoints
 from tcs.model.scene.environment.plant import add_environment, environment_parts
@@ -67,6 +68,7 @@ class ScenePlant:
         body_frames: Frames that goals may be fixed to.
         parts: Every collision shape: arm, body, environment.
         rule: The contact rule, which selects the pairs of parts to check.
+        contacts: Drake's search for contacts of these pairs.
     """
 
     diagram: Diagram
@@ -87,6 +89,7 @@ class ScenePlant:
     body_frames: dict[str, Frame]
     parts: tuple[Part, ...]
     rule: ContactRule
+    contacts: DrakeContacts
 
 
 def build_plant(
@@ -104,7 +107,7 @@ def build_plant(
     root = plant.GetBodyByName(robot.root_body, instance)
     on_floor = environment.mount is None
     base_joints = _add_base(plant, root, plant.world_frame()) if on_floor else ()
-    primitives = _add_primitives(plant, robot, instance)
+    primitives = _add_primitives(plant, scene_graph, robot, instance)
     added = add_environment(plant, environment)
     base_joints = base_joints or _add_base(plant, root, added.mount)
     for name, value in robot.joint_positions().items():
@@ -131,10 +134,10 @@ def build_plant(
     rule = ContactRule.of(
         parts, robot.disabled_pairs, allowed_contacts, where=where, on_floor=on_floor
     )
-    apply_rule(scene_graph, parts, rule)
     limits = robot.joint_limits()
+    diagram = builder.Build()
     return ScenePlant(
-        diagram=builder.Build(),
+        diagram=diagram,
         plant=plant,
         scene_graph=scene_graph,
         base_joints=base_joints,
@@ -155,6 +158,7 @@ def build_plant(
         },
         parts=parts,
         rule=rule,
+        contacts=DrakeContacts(diagram, plant, scene_graph, parts, rule),
     )
 
 
@@ -203,19 +207,16 @@ def _add_robot(plant: MultibodyPlant, robot: RobotFile, meshes: bool) -> ModelIn
 
 
 def _add_primitives(
-    plant: MultibodyPlant, robot: RobotFile, instance: ModelInstanceIndex
+    plant: MultibodyPlant, scene_graph: SceneGraph, robot: RobotFile, instance: ModelInstanceIndex
 ) -> tuple[GeometryId, ...]:
-    """Register the collision shapes of the robot's links."""
-    added = []
+    """Register the collision shapes of the robot's links, without a role: see `DrakeContacts`."""
+    source, added = plant.get_source_id(), []
     for i, primitive in enumerate(robot.load_primitives()):
         X_BG = RigidTransform(Quaternion(primitive.quaternion), primitive.xyz)
         body = plant.GetBodyByName(primitive.body, instance)
-        name = f"{primitive.body} {i}"
-        added.append(
-            plant.RegisterCollisionGeometry(
-                body, X_BG, _shape(primitive), name, ProximityProperties()
-            )
-        )
+        frame = plant.GetBodyFrameIdOrThrow(body.index())
+        shape = GeometryInstance(X_BG, _shape(primitive), f"{primitive.body} {i}")
+        added.append(scene_graph.RegisterGeometry(source, frame, shape))
     return tuple(added)
 
 

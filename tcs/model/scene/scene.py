@@ -231,11 +231,17 @@ class Scene:
             columns[:, i] += jacobian[:, velocity]
         return columns
 
-    def query_object(self) -> QueryObject:
-        """Return Drake's query object at the current state."""
+    def shape_pose(self, part: Part) -> RigidTransform:
+        """Return X_WG, the pose of a collision shape."""
         port = self.built.plant.get_geometry_query_input_port()
-        query: QueryObject = port.Eval(self._state)
-        return query
+        return port.Eval(self._state).GetPoseInWorld(part.geometry)
+
+    def query_object(self) -> QueryObject:
+        """Return Drake's query object at the current state, valid until the scene is asked again.
+
+        The first call takes longer than the others: Drake lists all pairs of shapes.
+        """
+        return self.built.contacts.at(self.positions())
 
     def clearances(self, max_distance: float) -> tuple[Contact, ...]:
         """Return the distances between checked pairs of bodies, closest first.

@@ -19,8 +19,7 @@ def test_shapes_are_where_drake_has_them(scene, group):
         scene.set_joint("head_turn", turn)
         scene.set_joint("head_tilt", turn / 10.0)
         frames.append(attached.frames_in_world(scene.plant_context))
-        query = scene.query_object()
-        expected.append([query.GetPoseInWorld(p.geometry).GetAsMatrix34() for p in parts])
+        expected.append([scene.shape_pose(part).GetAsMatrix34() for part in parts])
     scene.restore(before)
     # One product of rotations of either order of rounding.
     np.testing.assert_allclose(attached.at(np.array(frames)), expected, atol=1e-12)

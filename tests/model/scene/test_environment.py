@@ -270,7 +270,7 @@ def test_the_example_of_the_documentation_works(tmp_path, pr2):
     names = [part.name for part in scene.built.parts]
     assert {"table", "lamp::pole", "lamp::shade", "person::head_center"} <= set(names)
     lamp = scene.built.parts[names.index("lamp::shade")]
-    p_WG = scene.query_object().GetPoseInWorld(lamp.geometry).translation()
+    p_WG = scene.shape_pose(lamp).translation()
     np.testing.assert_allclose(p_WG, [0.2, 0.9, 1.45], atol=1e-12)
     scene.place_base(1.3, 0.9, 0.0)
     assert any(b == "table" for _, b, _ in scene.violations())

@@ -56,7 +56,6 @@ def test_arrays_put_every_shape_and_the_tool_where_drake_does(scene, lowered, fu
     scene.place_base(x, y, yaw)
     scene.set_torso(full_grid.axis("torso").values[level])
     scene.set_arm(q)
-    query = scene.query_object()
 
     R_WB, p_WB = rotation_z(yaw), np.array([x, y, 0.0])
     R_WA = R_WB @ arrays.arm_base_R[level]
@@ -66,13 +65,13 @@ def test_arrays_put_every_shape_and_the_tool_where_drake_does(scene, lowered, fu
     for i, part in enumerate(of_group(scene, Group.ARM)):
         R_WL, p_WL = links[arrays.arm.frame[i] - 1]
         R_WG, p_WG = R_WL @ arrays.arm.R[0, i], p_WL + R_WL @ arrays.arm.p[0, i]
-        assert_same_pose(R_WG, p_WG, query.GetPoseInWorld(part.geometry))
+        assert_same_pose(R_WG, p_WG, scene.shape_pose(part))
     for i, part in enumerate(of_group(scene, Group.BODY)):
         R_WG = R_WB @ arrays.body.R[level, i]
         p_WG = p_WB + R_WB @ arrays.body.p[level, i]
-        assert_same_pose(R_WG, p_WG, query.GetPoseInWorld(part.geometry))
+        assert_same_pose(R_WG, p_WG, scene.shape_pose(part))
     for i, part in enumerate(of_group(scene, Group.ENVIRONMENT)):
-        X_WG = query.GetPoseInWorld(part.geometry)
+        X_WG = scene.shape_pose(part)
         assert_same_pose(arrays.environment.R[0, i], arrays.environment.p[0, i], X_WG)
 
 
@@ -155,7 +154,7 @@ def test_names_and_paddings_belong_to_the_right_shapes(scene, lowered, wheelchai
 
 
 def test_the_pairs_are_those_that_drake_checks(scene, lowered):
-    inspector = scene.built.scene_graph.model_inspector()
+    inspector = scene.query_object().inspector()
     arrays = lowered.arrays
     groups = {group: of_group(scene, group) for group in Group}
     for first, second, matrix in (
@@ -212,9 +211,8 @@ def test_an_axis_of_the_environment_moves_its_joint(scene, shaving, wheelchair):
     for state, (tilt, shift) in enumerate(itertools.product(np.radians([-10, 0, 10]), [0.0, 0.1])):
         scene.set_joint("head_tilt", tilt)
         scene.set_joint("wheelchair_y", shift)
-        query = scene.query_object()
         for i, part in enumerate(of_group(scene, Group.ENVIRONMENT)):
-            X_WG = query.GetPoseInWorld(part.geometry)
+            X_WG = scene.shape_pose(part)
             assert_same_pose(arrays.environment.R[state, i], arrays.environment.p[state, i], X_WG)
         for i, X_WG in enumerate(goal_poses(scene, shaving)):
             assert_same_pose(arrays.goal_R[state, i], arrays.goal_p[state, i], X_WG)

@@ -73,8 +73,8 @@ def test_arrays_are_where_drake_has_them_while_the_furniture_moves(on_head_rest)
         for name, value in values.items():
             scene.set_joint(name, value)
         bases.append(scene.base_pose())
-        query, X_BW = scene.query_object(), scene.base_pose().inverse()
-        of_drake = [X_BW @ query.GetPoseInWorld(part.geometry) for part in parts]
+        X_BW = scene.base_pose().inverse()
+        of_drake = [X_BW @ scene.shape_pose(part) for part in parts]
         of_drake += [X_BW @ X for X in goal_poses(scene, task)]
         R = np.concatenate([arrays.environment.R[state], arrays.goal_R[state]])
         p = np.concatenate([arrays.environment.p[state], arrays.goal_p[state]])

@@ -26,7 +26,7 @@ def neighbours(scene, listed):
 def test_pairs_are_those_that_drake_checks(scene, listed):
     parts = scene.built.parts
     ours = {frozenset((parts[a].geometry, parts[b].geometry)) for a, b in listed._pairs}
-    candidates = scene.built.scene_graph.model_inspector().GetCollisionCandidates()
+    candidates = scene.query_object().inspector().GetCollisionCandidates()
     assert ours == set(map(frozenset, candidates))
 
 

@@ -92,7 +92,7 @@ def test_jacobian_is_the_derivative_of_the_tool_pose(scene, seed):
 
 
 def test_drake_checks_exactly_the_pairs_of_the_rule(scene):
-    inspector = scene.built.scene_graph.model_inspector()
+    inspector = scene.query_object().inspector()
     counts = {True: 0, False: 0}
     for a, b in itertools.combinations(scene.built.parts, 2):
         checked = scene.built.rule.is_checked(a, b)
@@ -234,8 +234,7 @@ def obstacle_scene(spec, *obstacles):
 
 
 def shape_poses(scene):
-    query = scene.query_object()
-    return {part.name: query.GetPoseInWorld(part.geometry) for part in scene.built.parts}
+    return {part.name: scene.shape_pose(part) for part in scene.built.parts}
 
 
 def test_a_box_of_the_users_own_blocks_the_arm(spec, scene):

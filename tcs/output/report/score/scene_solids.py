@@ -80,7 +80,7 @@ def goal_solids(scene: Scene, task: Task, current: int | None) -> list[Solid]:
 def part_solid(scene: Scene, part: Part, category: Category, *, in_mount: bool = False) -> Solid:
     """Return a collision shape in the present state of the scene, in W or as for a map."""
     corners = primitive_corners(*shape_of(scene.built.scene_graph.model_inspector(), part))
-    X = scene.query_object().GetPoseInWorld(part.geometry)
+    X = scene.shape_pose(part)
     if in_mount:
         (X,) = scene.seen_from_mount([X])
     return Solid.placed(category, corners, X.rotation().matrix(), X.translation())
