@@ -12,7 +12,7 @@ SCRIPTS = sorted(EXAMPLES.glob("*.py"))
 # What each must print, as one expression over all lines, and the files it writes.
 PRINTED = {
     "01_score_and_select": r"y 1 m, reaching 100% of the goals:\n.*base_x.*y -1 m, reaching 100%",
-    "02_own_environment": r"wheelchair:\n  4,598 pairs.*kitchen:\n  [1-4],\d{3} pairs",
+    "02_own_environment": r"wheelchair:\n  4,683 pairs.*kitchen:\n  [1-4],\d{3} pairs",
     "03_own_task": r"3 goals, weights \[0.25, 0.25, 0.5\].*\[True, True, True\]",
     "04_another_robot": r"pr2: 75%.*pr2_spoon: \d+%.*panda: \d+%",
     "05_observed_person": r"used \{'person_y': 0.0\}.*used \{'person_y': 0.1\}.*is 0.010 m from "

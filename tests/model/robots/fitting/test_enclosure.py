@@ -117,7 +117,7 @@ def test_number_of_shapes_is_small(robot):
 
 def test_protrusion_is_measured(pr2):
     """Shapes shrunk by 5 mm leave triangles that protrude by 5 mm."""
-    body = "l_forearm_link"
+    body = "l_forearm_roll_link"
     (sound,) = (found for found in enclosure(pr2) if found.body == body)
     assert (sound.outside, sound.farthest) == (0, 0.0)
     (worse,) = (found for found in enclosure(_Shrunk.of(pr2, body)) if found.body == body)
