@@ -84,13 +84,13 @@ def test_limits_are_those_in_force(pr2):
 
 def test_shapes_that_are_too_small_are_found(pr2, tmp_path):
     shapes = [
-        shape.shrunk(0.003) if shape.body == "l_upper_arm_link" else shape
+        shape.shrunk(0.003) if shape.body == "l_forearm_roll_link" else shape
         for shape in pr2.load_primitives()
     ]
     found = check_up(with_shapes(pr2, shapes, tmp_path), samples=1)
     assert not found.is_sound
     (problem,) = found.problems
-    assert "'l_upper_arm_link'" in problem
+    assert "'l_forearm_roll_link'" in problem
     assert "do not lie in one" in problem
 
 
