@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tcs.model.scene import NeighbourList
+from tcs.model.robots import load_robot
+from tcs.model.scene import NeighbourList, Scene, SceneSpec
 
 REACHING = np.array([0.3, 0.2, 0.5, -1.2, 0.4, -0.8, 0.2])
 
@@ -23,9 +24,11 @@ def neighbours(scene, listed):
     return listed
 
 
-def test_pairs_are_those_that_drake_checks(scene, listed):
-    parts = scene.built.parts
-    ours = {frozenset((parts[a].geometry, parts[b].geometry)) for a, b in listed._pairs}
+def test_pairs_are_those_that_drake_checks(wheelchair):
+    scene = Scene(SceneSpec(load_robot("iiwa7"), wheelchair))
+    parts, pairs = scene.built.parts, NeighbourList(scene)._pairs
+    ours = {frozenset((parts[a].geometry, parts[b].geometry)) for a, b in pairs}
+    assert len(ours) == len(pairs)
     candidates = scene.query_object().inspector().GetCollisionCandidates()
     assert ours == set(map(frozenset, candidates))
 

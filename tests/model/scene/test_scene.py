@@ -109,7 +109,9 @@ def test_drake_checks_exactly_the_pairs_of_the_rule(scene):
 def test_what_is_checked(scene, pr2):
     rule = scene.built.rule
     disabled = {frozenset(pair) for pair in pr2.disabled_pairs}
-    for a, b in itertools.combinations(scene.built.parts, 2):
+    # The rule looks at the kind of a shape alone.
+    of_kinds = {part.kind: part for part in scene.built.parts}.values()
+    for a, b in itertools.combinations(of_kinds, 2):
         groups = {a.group, b.group}
         if groups == {Group.ENVIRONMENT} or groups == {Group.BODY}:
             expected = False
@@ -173,7 +175,7 @@ def test_violations_start_at_the_required_clearance(scene):
     # Move the base towards the chair from the front, up to the first violation.
     scene.set_arm(REACHING)
     closest = []
-    for x in np.linspace(2.2, 1.5, 141):
+    for x in np.linspace(2.2, 1.5, 36):
         scene.place_base(x, 0.0, 0.0)
         hits = {(a, b) for a, b, _ in scene.violations()}
         for a, b, distance in scene.clearances(0.05):
