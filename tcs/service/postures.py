@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections import OrderedDict
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +17,10 @@ from tcs.placement.store import ScoreFile, file_of_arm
 from tcs.placement.tables import Reason
 
 if TYPE_CHECKING:
-    from tcs.output.report.score.scored_scenes import ScoredScene
+    from pydrake.multibody.tree import BodyIndex
+
+    from tcs.model.scene import Scene
+    from tcs.model.tasks import Task
 
 _KEPT = 3
 """Most scenes that are kept."""
@@ -26,13 +30,24 @@ _SHAPES = ("sphere", "capsule", "box")
 """Names of the kernel's shapes, by their numbers."""
 
 
+@dataclass(frozen=True, eq=False)
+class _ShownScene:
+    """The scene of a score file, and what is the same in each of its states."""
+
+    task: Task
+    scene: Scene
+    shapes: list[dict[str, Any]]
+    bodies: list[BodyIndex]
+    """The bodies that the shapes are fixed to."""
+
+
 class ScenePostures:
     """Scenes of score files, kept while they are looked at."""
 
     def __init__(self) -> None:
         """Keep no scene yet."""
         self._lock = threading.Lock()
-        self._scenes: OrderedDict[str, ScoredScene] = OrderedDict()
+        self._scenes: OrderedDict[str, _ShownScene] = OrderedDict()
 
     def at(
         self,
@@ -55,9 +70,9 @@ class ScenePostures:
 
         Returns:
             `shapes`: each with its body, category, contact name, type, size [m] and pose in the
-            body; `frames`: for each frame the pose of every body in W, as x, y, z [m] and the
-            quaternion w, x, y, z; `goals`: positions and the direction from which the tool comes;
-            `goal`: the goal that the arm is at, or None.
+            body, the same objects at each call; `frames`: for each frame the pose of every body in
+            W, as x, y, z [m] and the quaternion w, x, y, z; `goals`: positions and the direction
+            from which the tool comes; `goal`: the goal that the arm is at, or None.
 
         Raises:
             SelectionError: If there is no such goal, a posture has another number of joints, or
@@ -86,7 +101,8 @@ class ScenePostures:
         from tcs.model.scene import goal_poses
         from tcs.output.view.scene_objects import resting_arm
 
-        job, scene = self._scene(digest, file)
+        shown = self._scene(digest, file)
+        scene = shown.scene
         member = file.configurations.configuration(index)
         for name, value in member.environment:
             scene.set_joint(name, value)
@@ -99,39 +115,41 @@ class ScenePostures:
             if any(len(one) != count for one in arm):
                 raise SelectionError(f"'arm' must hold {count} values for each posture.")
             postures = [np.array(one) for one in arm]
-        shapes, bodies = _shapes_of(scene)
         frames = []
         for posture in postures:
             scene.set_arm(posture)
             plant, context = scene.built.plant, scene.plant_context
-            poses = [plant.EvalBodyPoseInWorld(context, plant.get_body(body)) for body in bodies]
+            poses = [
+                plant.EvalBodyPoseInWorld(context, plant.get_body(body)) for body in shown.bodies
+            ]
             frames.append([_plain(X) for X in poses])
         goals = [
-            [*X.translation(), *X.rotation().matrix()[:, 0]] for X in goal_poses(scene, job.task)
+            [*X.translation(), *X.rotation().matrix()[:, 0]] for X in goal_poses(scene, shown.task)
         ]
         return {
             "configuration": index,
-            "shapes": shapes,
+            "shapes": shown.shapes,
             "frames": frames,
             "goals": np.round(goals, _DECIMALS).tolist(),
             "goal": goal,
         }
 
-    def _scene(self, digest: str, file: ScoreFile) -> ScoredScene:
+    def _scene(self, digest: str, file: ScoreFile) -> _ShownScene:
         """Return the scene of a file, built when it is first looked at."""
         from tcs.output.report.score.scored_scenes import scored_scene
         from tcs.output.report.score.shown_set import ShownSet
 
         if digest not in self._scenes:
             shown = ShownSet(None, (), (), file.nominal_index, "", file)
-            self._scenes[digest] = scored_scene(file, shown)
+            job, scene = scored_scene(file, shown)
+            self._scenes[digest] = _ShownScene(job.task, scene, *_shapes_of(scene))
         self._scenes.move_to_end(digest)
         while len(self._scenes) > _KEPT:
             self._scenes.popitem(last=False)
         return self._scenes[digest]
 
 
-def _shapes_of(scene: Any) -> tuple[list[dict[str, Any]], list[Any]]:
+def _shapes_of(scene: Scene) -> tuple[list[dict[str, Any]], list[BodyIndex]]:
     """Return the shapes of a scene but its floor, and the bodies that they are fixed to."""
     from tcs.model.scene.contacts import Group, shape_of
     from tcs.output.report.score.scene_solids import environment_parts
