@@ -21,7 +21,7 @@ from tcs.model.scene.contacts import Group
 from tcs.output.draw import Category
 
 FloatArray = NDArray[np.float64]
-Surface = tuple[FloatArray, NDArray[np.int32]]
+TriangleMesh = tuple[FloatArray, NDArray[np.int32]]
 """Corners [m], shape (3, n), and triangles, shape (3, m)."""
 
 _GREY = Rgba(0.75, 0.77, 0.8, 1.0)
@@ -106,7 +106,7 @@ def draw_shapes(
             which take seconds to read.
     """
     numbers = itertools.count()
-    surfaces: dict[tuple[BodyIndex, tuple[float, ...]], list[Surface]] = {}
+    surfaces: dict[tuple[BodyIndex, tuple[float, ...]], list[TriangleMesh]] = {}
     for one in shapes:
         surface = _surface(one, compact=compact)
         if surface is not None:
@@ -120,7 +120,7 @@ def draw_shapes(
         meshcat.SetTriangleMesh(path, *joined(parts), Rgba(*channels))
 
 
-def sharp_box(size: FloatArray) -> Surface:
+def sharp_box(size: FloatArray) -> TriangleMesh:
     """Return corners [m], shape (3, 8), and triangles, shape (3, 12), of a box.
 
     Args:
@@ -131,7 +131,7 @@ def sharp_box(size: FloatArray) -> Surface:
     return np.asfortranarray(corners.T), np.asfortranarray(faces.T)
 
 
-def joined(surfaces: Sequence[Surface]) -> Surface:
+def joined(surfaces: Sequence[TriangleMesh]) -> TriangleMesh:
     """Return surfaces as one."""
     firsts = np.cumsum([0, *(corners.shape[1] for corners, _ in surfaces[:-1])], dtype=np.int32)
     faces = [faces + first for (_, faces), first in zip(surfaces, firsts, strict=True)]
@@ -139,7 +139,7 @@ def joined(surfaces: Sequence[Surface]) -> Surface:
     return np.asfortranarray(corners), np.asfortranarray(np.concatenate(faces, axis=1))
 
 
-def rounded_box(size: FloatArray) -> Surface:
+def rounded_box(size: FloatArray) -> TriangleMesh:
     """Return corners [m], shape (3, n), and triangles, shape (3, m), of a box with round edges.
 
     It is within the box, and touches the middles of its faces.
@@ -180,7 +180,7 @@ def rgba(colour: str) -> Rgba:
     return Rgba(*to_rgb(colour), 1.0)
 
 
-def _surface(one: BodyShape, *, compact: bool) -> Surface | None:
+def _surface(one: BodyShape, *, compact: bool) -> TriangleMesh | None:
     """Return the surface of a shape in its body's frame; None of one that is sent as it is."""
     if isinstance(one.shape, Box):
         box = rounded_box if one.is_rounded else sharp_box
@@ -197,7 +197,7 @@ def _channels(colour: Rgba) -> tuple[float, ...]:
     return colour.r(), colour.g(), colour.b(), colour.a()
 
 
-def _triangles(mesh: Mesh) -> Surface:
+def _triangles(mesh: Mesh) -> TriangleMesh:
     """Return corners [m], shape (3, n), and triangles, shape (3, m), of a mesh."""
     found = mesh_triangles(Path(mesh.source().path()))
     # Files repeat a corner for each of its triangles; Meshcat keeps it in single precision.

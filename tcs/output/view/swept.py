@@ -13,13 +13,13 @@ from tcs.kernel.arrays import FloatArray
 from tcs.model.scene import Scene
 from tcs.model.scene.contacts import Group, shape_of
 from tcs.output.draw import primitive_corners
-from tcs.output.view.shapes import Surface, joined
+from tcs.output.view.shapes import TriangleMesh, joined
 
 SPACING = 0.05
 """Greatest motion of a corner of a body between two places at which the mesh has it [m]."""
 
 
-def swept_mesh(scene: Scene, postures: Iterable[FloatArray]) -> Surface:
+def swept_mesh(scene: Scene, postures: Iterable[FloatArray]) -> TriangleMesh:
     """Return the hulls of the arm's bodies in W at postures along a motion.
 
     Each body is left out where none of its corners has moved by `SPACING` since it was last shown:
