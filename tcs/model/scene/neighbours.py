@@ -20,6 +20,8 @@ SKIN = 0.04
 pairs at each posture, but more searches."""
 ROUNDING = 1e-6
 """Added to required distances when pairs are left out [m]: poses round, and far less."""
+CLUSTER = 16
+"""Most shapes of a cluster: half a million pairs of shapes are some thousand pairs of clusters."""
 
 
 class NeighbourList:
@@ -27,8 +29,9 @@ class NeighbourList:
 
     A pair is left out only while a bound shows that it cannot come closer than required: the
     distance of boxes that enclose its shapes, along their axes, when close pairs were last sought,
-    less the motion of both bodies since, from Drake's poses. Drake measures all other pairs at
-    every posture. If more than the arm has moved, close pairs are sought again.
+    less the motion of both bodies since, from Drake's poses. All pairs of two clusters, shapes of a
+    body that lie together, are left out by the boxes around the clusters. Drake measures all other
+    pairs at every posture. If more than the arm has moved, close pairs are sought again.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -44,7 +47,13 @@ class NeighbourList:
         self._arm = np.array(sorted(arm))
         self._radius = np.zeros(len(bodies))
         np.maximum.at(self._radius, self._body, self._boxes.reach)
-        self._pairs, self._required = _checked_pairs(scene, parts)
+        cluster = _clusters(self._body, self._boxes.X_BG[:, :, 3])
+        self._around = self._boxes.around(cluster)
+        self._body_of_cluster = np.zeros(cluster.max() + 1, dtype=np.intp)
+        self._body_of_cluster[cluster] = self._body
+        self._pairs, self._required = _checked_pairs(scene, parts, cluster)
+        self._clusters, self._first = np.unique(cluster[self._pairs], axis=0, return_index=True)
+        self._of_clusters = np.maximum.reduceat(self._required, self._first)
         self._near = np.zeros(0, dtype=np.intp)
         self._bound = np.zeros(0)
         self._sought: FloatArray | None = None
@@ -95,10 +104,17 @@ class NeighbourList:
         """Seek the pairs that may touch within `SKIN`; return that no body has moved since."""
         self._others = self.scene.positions_without_arm()
         self._sought = self._poses(np.arange(len(self._bodies)))
-        poses = self._sought[self._body]
-        self._near, self._bound = self._boxes.near(
-            poses, self._pairs, self._required + 2.0 * SKIN + ROUNDING
+        skin = 2.0 * SKIN + ROUNDING
+        clusters, _ = self._around.near(
+            self._sought[self._body_of_cluster], self._clusters, self._of_clusters + skin
         )
+        ends = np.append(self._first[1:], len(self._pairs))
+        ranges = [np.arange(self._first[i], ends[i]) for i in clusters]
+        rows = np.concatenate([np.zeros(0, dtype=np.intp), *ranges])
+        near, self._bound = self._boxes.near(
+            self._sought[self._body], self._pairs[rows], self._required[rows] + skin
+        )
+        self._near = rows[near]
         return np.zeros(len(self._bodies))
 
     def _poses(self, bodies: NDArray[np.intp]) -> FloatArray:
@@ -132,6 +148,17 @@ class _Boxes:
                 radius, length = size[0], size[1] if type_ == CAPSULE else 0.0
                 half.append((radius, radius, radius + length))
         return cls(np.array(poses), np.array(half))
+
+    def around(self, number: NDArray[np.intp]) -> _Boxes:
+        """Return boxes along the axes of the body around the boxes of each number, 0 and up."""
+        count = number.max() + 1
+        extent = np.einsum("nij,nj->ni", np.abs(self.X_BG[:, :, :3]), self.half)
+        lower, upper = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+        np.minimum.at(lower, number, self.X_BG[:, :, 3] - extent)
+        np.maximum.at(upper, number, self.X_BG[:, :, 3] + extent)
+        X_BC = np.zeros((count, 3, 4))
+        X_BC[:, :, :3], X_BC[:, :, 3] = np.eye(3), 0.5 * (lower + upper)
+        return _Boxes(X_BC, 0.5 * (upper - lower))
 
     @property
     def reach(self) -> FloatArray:
@@ -168,10 +195,37 @@ class _Boxes:
         return rows[closer], bound[closer]
 
 
-def _checked_pairs(scene: Scene, parts: tuple[Part, ...]) -> tuple[NDArray[np.intp], FloatArray]:
-    """Return two numbers of shapes, shape (m, 2), and the required distance [m] of each pair."""
+def _clusters(body: NDArray[np.intp], centres: FloatArray) -> NDArray[np.intp]:
+    """Return the number of the cluster of each shape, shape (n,).
+
+    Args:
+        body: Number of the body of each shape, shape (n,).
+        centres: Centres of the shapes in their bodies [m], shape (n, 3).
+    """
+    number = np.zeros(len(body), dtype=np.intp)
+    count, left = 0, [np.flatnonzero(body == one) for one in np.unique(body)]
+    while left:
+        rows = left.pop()
+        if len(rows) <= CLUSTER:
+            number[rows] = count
+            count += 1
+            continue
+        axis = np.argmax(np.ptp(centres[rows], axis=0))
+        rows = rows[np.argsort(centres[rows, axis], kind="stable")]
+        left += [rows[: len(rows) // 2], rows[len(rows) // 2 :]]
+    return number
+
+
+def _checked_pairs(
+    scene: Scene, parts: tuple[Part, ...], cluster: NDArray[np.intp]
+) -> tuple[NDArray[np.intp], FloatArray]:
+    """Return two numbers of shapes, shape (m, 2), and the required distance [m] of each pair.
+
+    The pairs are in the order of their clusters.
+    """
     # The pairs that Drake checks: it would list them one by one, hundreds of thousands.
     pairs = np.argwhere(np.triu(scene.built.rule.checked(list(parts), list(parts)), 1))
+    pairs = pairs[np.lexsort(cluster[pairs].T[::-1])]
     names = sorted({part.name for part in parts})
     required = np.array([[scene.required_clearance(a, b) for b in names] for a in names])
     name = np.array([names.index(part.name) for part in parts])

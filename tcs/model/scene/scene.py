@@ -297,13 +297,18 @@ class Scene:
 
     def violations(self) -> tuple[Contact, ...]:
         """Return the checked pairs of bodies that are closer than required, closest first."""
-        largest = sorted(self._pads.values())[-2:]
-        farthest = max(self._self_margin, self._contact_margin, sum(largest))
         return tuple(
             contact
-            for contact in self.clearances(farthest)
+            for contact in self.clearances(self._greatest_requirement())
             if contact[2] < self.required_clearance(contact[0], contact[1])
         )
+
+    def _greatest_requirement(self) -> float:
+        """Return the greatest distance that any checked pair of bodies must keep [m]."""
+        of_robot = sorted(p for name, p in self._pads.items() if name not in self._of_environment)
+        others = max((self._pads[name] for name in self._of_environment), default=0.0)
+        own = sum(of_robot[-2:])
+        return max(self._self_margin, self._contact_margin, own, of_robot[-1] + others)
 
     def _set(self, index: int, value: float) -> None:
         q = self.built.plant.GetPositions(self._state).copy()

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.kernel.verification.reference import measured, prescribed
-from tcs.model.scene import Scene, arm_chain, axis_of_turn, goal_poses
+from tcs.model.scene import NeighbourList, Scene, arm_chain, axis_of_turn, goal_poses
 from tcs.placement.scoring.job import Job
 
 POSITION_BAR = 1e-6
@@ -73,6 +73,7 @@ class DrakeChecker:
     def __init__(self, job: Job, scene: Scene, measure: str) -> None:
         """Take a job, its scene, and the name of its dexterity measure."""
         self._job, self._scene, self._measure = job, scene, measure
+        self._neighbours = NeighbourList(scene)
         self._lower, self._upper = scene.arm_limits
         self._turn = _axis_of_turn(job, scene)
         self._grid = job.scored_grid
@@ -120,7 +121,7 @@ class DrakeChecker:
             position, rotation = free.errors(X_GT.rotation().matrix(), X_GT.translation())
         contacts = [
             distance
-            for first, second, distance in scene.violations()
+            for first, second, distance in self._neighbours.violations()
             if distance < scene.required_clearance(first, second) - CLEARANCE_ROUNDING
         ]
         J = scene.tool_jacobian()

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from tcs.model.robots import load_robot
-from tcs.model.scene import NeighbourList, Scene, SceneSpec
+from tcs.model.scene import NeighbourList, Scene, SceneSpec, load_environment
+from tcs.model.scene.neighbours import CLUSTER, _clusters
 
 REACHING = np.array([0.3, 0.2, 0.5, -1.2, 0.4, -0.8, 0.2])
 
@@ -49,6 +50,36 @@ def test_contacts_on_a_path_are_those_of_all_pairs(neighbours, rng):
             touched += bool(found)
             free += not found
     assert min(touched, free) > 2
+
+
+@pytest.mark.parametrize(("robot", "environment"), [("pr2", "wheelchair"), ("stretch", "bed")])
+def test_contacts_anywhere_are_those_of_all_pairs(robot, environment, rng):
+    """Postures that have nothing to do with one another: all clusters of shapes are sought anew."""
+    scene = Scene(SceneSpec(load_robot(robot), load_environment(environment)))
+    neighbours = NeighbourList(scene)
+    lower, upper = (np.clip(limit, -3.0, 3.0) for limit in scene.arm_limits)
+    touched, bodies = 0, set()
+    for _ in range(40):
+        scene.place_base(*rng.uniform([-1.2, -1.2, -3.0], [1.2, 1.2, 3.0]))
+        scene.set_torso(rng.uniform(*scene.built.torso_limits))
+        scene.set_arm(rng.uniform(lower, upper))
+        expected, found = scene.violations(), neighbours.violations()
+        assert [c[:2] for c in found] == [c[:2] for c in expected]
+        np.testing.assert_allclose([c[2] for c in found], [c[2] for c in expected], atol=1e-9)
+        touched += bool(found)
+        bodies |= {c[:2] for c in found}
+    assert touched > 10
+    assert len(bodies) > 20
+
+
+def test_clusters_are_of_one_body_and_hold_each_shape_once(scene, listed):
+    parts = scene.built.parts
+    cluster = _clusters(listed._body, listed._boxes.X_BG[:, :, 3])
+    members = [np.flatnonzero(cluster == i) for i in range(cluster.max() + 1)]
+    assert sorted(np.concatenate(members)) == list(range(len(parts)))
+    assert all(len({parts[i].body for i in rows}) == 1 for rows in members)
+    assert max(map(len, members)) <= CLUSTER
+    assert len(members) < len(parts) / 4
 
 
 def test_pairs_are_sought_again_when_the_base_moves(neighbours):
