@@ -1,5 +1,6 @@
 """Keys, names and defaults that the docs list are those of the code."""
 
+import json
 import re
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 import tcs
 from tcs.kernel.dexterity import MEASURES
 from tcs.model.grid import Grid
+from tcs.model.robots import load_robot, robot_names
 from tcs.output.report import CheckSizes, make_score_page, make_score_report
 from tcs.output.words.reasons import COLOUR_NAMES
 from tcs.placement.reasons import explain, fix_weights
@@ -18,6 +20,7 @@ from tests.placement.store.example import score_file
 from tests.placement.store.test_success import with_estimates
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
+FIGURES = DOCS.parent / "benchmarks" / "figures"
 
 
 def page(name: str) -> str:
@@ -110,3 +113,15 @@ def test_parts_of_a_report(tmp_path):
     listed = [row[0] for row in rows(page("reading-a-report"), "| part of the page |")]
     for section in report.sections:
         assert any(part.startswith(section.title) for part in listed), section.title
+
+
+def test_the_shapes_of_every_robot_are_measured():
+    expected = set()
+    for name in robot_names():
+        robot = load_robot(name)
+        joints = [robot.model().joints[joint] for joint in robot.arm_joints]
+        both = any(joint.soft != joint.hard for joint in joints)
+        expected |= {f"{name}, soft limits", f"{name}, hard limits"} if both else {name}
+    saved = json.loads((FIGURES / "shapes.json").read_text(encoding="utf-8"))
+    assert {line for line, *_ in saved["tables"]["blocked"]["rows"]} == expected
+    assert {cells[0] for cells in rows(page("robots"), "|  | free of self-collision |")} == expected

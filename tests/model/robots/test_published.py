@@ -307,6 +307,23 @@ def test_the_wrist_of_jaco_folds_into_itself_only_beyond_its_range():
     assert distances[len(within) :].max() <= 0.0
 
 
+def test_tiago_pros_first_link_crosses_the_fixed_torso_only_while_the_torso_is_low():
+    """Below that height they cross at every angle: a check would forbid every posture."""
+    robot = load_robot("tiago_pro").with_choices(limits="hard")
+    pair, turn = ("arm_left_1_link", "torso_base_link"), "arm_left_1_joint"
+    assert pair in robot.disabled_pairs
+    turns = np.linspace(*robot.joint_limits()[turn], 7)
+    _, highest = robot.model().joints[robot.torso_joint].hard
+    low, high = (
+        mesh_distances(
+            robot, pair, [{turn: q, robot.torso_joint: z} for z in heights for q in turns]
+        )
+        for heights in ((0.0, 0.045, 0.085), (0.0905, 0.11, 0.15, highest))
+    )
+    assert low.max() <= 0.0
+    assert high.min() > 0.0
+
+
 @pytest.mark.parametrize(("name", "side"), [("pr2", "l"), ("pr2_right", "r")])
 def test_shoulder_and_upper_arm_cross_only_beyond_the_range_of_the_lift(name, side):
     robot = load_robot(name)
