@@ -110,17 +110,19 @@ def main() -> None:
     row("postures, exempt pairs, seed", f"{options.postures}, {options.exempt}, {options.seed}")
     blocking: list[list[str]] = []
     crossing: list[list[str]] = []
+    lines: list[str] = []
     for name in options.robots.split(","):
         shipped = load_robot(name)
         has_both = _has_soft_limits(shipped)
         for limits in ("soft", "hard") if has_both else (shipped.limits,):
             bodies = Bodies(shipped.with_choices(limits=limits))
             line = f"{name}, {limits} limits" if has_both else name
+            lines.append(line)
             blocking += blocked(line, bodies, options.postures, options.seed)
             crossing += exempt(line, bodies, options.exempt, options.seed)
     record("pairs", ["robot", "contact of shapes alone", "postures [%]"], blocking)
     record("exempt", ["robot", "exempt pair whose meshes cross", "postures [%]"], crossing)
-    save(options, keep=True)
+    save(options, keep=True, measured=lines)
 
 
 def blocked(line: str, bodies: Bodies, postures: int, seed: int) -> list[list[str]]:

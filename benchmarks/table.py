@@ -15,7 +15,7 @@ import shlex
 import statistics
 import sys
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -98,13 +98,17 @@ def record_text(name: str, text: str) -> None:
     _tables[name] = {"text": text}
 
 
-def save(options: argparse.Namespace, *, keep: bool = False) -> None:
+def save(
+    options: argparse.Namespace, *, keep: bool = False, measured: Collection[str] = ()
+) -> None:
     """Write the recorded tables where `--save` was given.
 
     Args:
         options: The command line.
         keep: Whether saved tables, and rows with another first cell, that this run did not measure
             are kept, with the run they are of.
+        measured: First cells of which this run would have recorded rows in each of its tables: a
+            table that has none of them keeps no earlier ones.
     """
     if not options.save:
         return
@@ -124,13 +128,16 @@ def save(options: argparse.Namespace, *, keep: bool = False) -> None:
     make_folder(FIGURES)
     path = FIGURES / f"{script.stem}.json"
     if keep and path.exists():
-        saved = with_earlier(saved, json.loads(path.read_text(encoding="utf-8")))
+        before = json.loads(path.read_text(encoding="utf-8"))
+        saved = with_earlier(saved, before, measured)
     with whole_file(path, "Figures") as file:
         file.write(json.dumps(saved, indent=1, ensure_ascii=False).encode() + b"\n")
     print(f"wrote {path}")
 
 
-def with_earlier(saved: dict[str, Any], before: dict[str, Any]) -> dict[str, Any]:
+def with_earlier(
+    saved: dict[str, Any], before: dict[str, Any], measured: Collection[str] = ()
+) -> dict[str, Any]:
     """Return what a run saved, with the tables and rows of earlier runs that it did not measure.
 
     Rows are the same if their first cells are. A table that this run has with other columns, or
@@ -140,6 +147,7 @@ def with_earlier(saved: dict[str, Any], before: dict[str, Any]) -> dict[str, Any
         saved: What `save` writes, of this run.
         before: What was written before. Its key `earlier` has, for each table, the runs that rows
             were kept from: their first cells, command, date, machine, load and versions.
+        measured: First cells that this run measured, whether it has rows of them or not.
     """
     tables, earlier = {}, {}
     for name in dict.fromkeys([*before["tables"], *saved["tables"]]):
@@ -147,17 +155,19 @@ def with_earlier(saved: dict[str, Any], before: dict[str, Any]) -> dict[str, Any
         if new is not None and (old is None or new.get("columns") != old.get("columns", ())):
             tables[name] = new
             continue
-        measured: dict[str, list[list[str]]] = {}
-        for cells in new["rows"] if new else ():
-            measured.setdefault(cells[0], []).append(cells)
+        found: dict[str, list[list[str]]] = {}
+        if new is not None:
+            found = {first: [] for first in measured}
+            for cells in new["rows"]:
+                found.setdefault(cells[0], []).append(cells)
         before_of = [cells[0] for cells in old.get("rows", [["all"]])]
-        kept = [first for first in dict.fromkeys(before_of) if first not in measured]
+        kept = [first for first in dict.fromkeys(before_of) if first not in found]
         tables[name] = old
         if new is not None:
             # Rows of one first cell stay together, where they were.
-            rows: dict[str, list[list[str]]] = {first: [] for first in before_of} | measured
+            rows: dict[str, list[list[str]]] = {first: [] for first in before_of} | found
             for cells in old["rows"]:
-                if cells[0] not in measured:
+                if cells[0] not in found:
                     rows[cells[0]].append(cells)
             tables[name] = {**new, "rows": [cells for group in rows.values() for cells in group]}
         runs = _runs_of(kept, name, saved, before)

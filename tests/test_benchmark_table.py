@@ -20,7 +20,7 @@ def run(monkeypatch, tmp_path):
     """Return a function that saves tables as a run of a script of its own; it returns the file."""
     monkeypatch.syspath_prepend(str(FOLDER))
 
-    def saved(arguments, tables, *, load="0", keep=True):
+    def saved(arguments, tables, *, load="0", keep=True, measured=()):
         sys.modules.pop("table", None)
         table = importlib.import_module("table")
         monkeypatch.setattr(table, "FIGURES", tmp_path)
@@ -28,7 +28,7 @@ def run(monkeypatch, tmp_path):
         table._began["load"] = load
         for name, rows in tables.items():
             table.record(name, COLUMNS, rows)
-            table.save(SAVE, keep=keep)
+            table.save(SAVE, keep=keep, measured=measured)
         return json.loads((tmp_path / "made.json").read_text(encoding="utf-8"))
 
     yield saved
@@ -70,6 +70,21 @@ def test_rows_are_of_the_run_that_measured_them_last(run):
     saved = run("", {"rows": [["a", "6"], ["b", "6"], ["c", "6"]]}, load="4")
     assert "earlier" not in saved
     assert set(rows_of(saved, "rows").values()) == {"6"}
+
+
+def test_rows_that_a_run_no_longer_finds_are_left_out(run):
+    tables = {
+        "rows": [["a", "1"], ["b", "2"]],
+        "crossing": [["a", "3"], ["b", "4"]],
+        "cma": [["a", "7"]],
+    }
+    run("", tables, load="1")
+    saved = run("--rows a", {"rows": [["a", "5"]], "crossing": []}, load="2", measured=["a"])
+    assert rows_of(saved, "rows") == {"a": "5", "b": "2"}
+    assert rows_of(saved, "crossing") == {"b": "4"}
+    # This table was not measured at all.
+    assert rows_of(saved, "cma") == {"a": "7"}
+    assert [run["rows"] for run in saved["earlier"]["crossing"]] == [["b"]]
 
 
 def test_a_run_that_saves_after_each_table_is_one_run(run):
