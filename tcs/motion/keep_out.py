@@ -11,6 +11,7 @@ from tcs.kernel.arrays import BOX, FloatArray
 from tcs.model.scene import LoweredScene, Scene, SceneSpec
 from tcs.model.scene.contacts import Group
 from tcs.model.scene.environment.environment_file import Obstacle
+from tcs.model.scene.environment.shapes import named_shapes
 from tcs.model.tasks import KeepOut, Task
 from tcs.placement.scoring.job import Job
 
@@ -60,8 +61,8 @@ def _poses(lowered: LoweredScene, task: Task, box: KeepOut) -> tuple[FloatArray,
     return R_WH, lowered.arrays.goal_p[:, number] + R_WH @ offset
 
 
-def scene_with_keep_out(job: Job, scene: Scene) -> Scene:
-    """Return a new live scene in which the boxes are obstacles to the arm, in the same state.
+def spec_with_keep_out(job: Job, scene: Scene) -> SceneSpec:
+    """Return the robot, and the environment with the boxes as obstacles where they are now.
 
     Args:
         job: The job.
@@ -80,9 +81,19 @@ def scene_with_keep_out(job: Job, scene: Scene) -> Scene:
             )
         )
     walled = environment.model_copy(update={"obstacles": (*environment.obstacles, *boxes)})
-    spec = SceneSpec(robot, walled)
+    return SceneSpec(robot, walled)
+
+
+def scene_with_keep_out(job: Job, scene: Scene) -> Scene:
+    """Return a new live scene in which the boxes are obstacles to the arm, in the same state.
+
+    Args:
+        job: The job.
+        scene: Its live scene, at a stop.
+    """
+    spec = spec_with_keep_out(job, scene)
     others = {part.name for part in scene.built.parts if part.group is Group.BODY}
-    walls = [part.name for part in Scene(spec).built.parts if part.name.startswith(NAME)]
+    walls = [name for name in named_shapes(spec.environment)[0] if name.startswith(NAME)]
     allowed = [*job.task.allowed_contacts, *((body, wall) for body in others for wall in walls)]
     copy = Scene(spec, allowed_contacts=allowed)
     copy.restore(scene.positions())

@@ -83,11 +83,12 @@ def check_plan(
     job, scene = rebuild_made_from(plan.made_from)
     check_names(plan, job)
     total, done = sum(len(stop.segments) for stop in plan.stops), 0
+    check = None
     edges = false = jumps = goals = 0
     error = velocity = acceleration = jerk = 0.0
     for planned in plan.stops:
         stop = stop_of(plan, planned, job, scene)
-        check = StopCheck(stop)
+        check = StopCheck(stop, check)
         jumps += _jumps(planned, stop)
         for segment in planned.segments:
             edges += segment.edges

@@ -101,7 +101,7 @@ def plan(
         for goal in range(len(job.task.goals))
         if not serving[goal]
     }
-    stops, edges, false = [], 0, 0
+    stops, edges, false, check = [], 0, 0, None
     for number, (h, values) in enumerate(places):
         goals = [
             goal
@@ -117,7 +117,7 @@ def plan(
         planned, found = plan_stop(stop, index, number, goals, order, limits, report.planned)
         results |= {result.goal: result for result in found}
         stops.append(planned)
-        check = StopCheck(stop)
+        check = StopCheck(stop, check)
         edges += sum(segment.edges for segment in planned.segments)
         for done, segment in enumerate(planned.segments, 1):
             false += check.false_pieces(segment)

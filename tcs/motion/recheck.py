@@ -10,7 +10,7 @@ from tcs.kernel.arrays import FloatArray
 from tcs.kernel.motion.scene import MotionScene
 from tcs.model.scene import NeighbourList
 from tcs.motion.curves import Curve
-from tcs.motion.keep_out import scene_with_keep_out
+from tcs.motion.keep_out import scene_with_keep_out, spec_with_keep_out
 from tcs.motion.motion_plan import Segment
 from tcs.motion.stops import Stop
 
@@ -26,17 +26,32 @@ COARSE = 24
 class StopCheck:
     """The re-check of the motions of one stop, whose live scenes it sets up."""
 
-    def __init__(self, stop: Stop) -> None:
-        """Take the stop to which the live scene is set."""
+    def __init__(self, stop: Stop, before: StopCheck | None = None) -> None:
+        """Set up the live scenes.
+
+        Args:
+            stop: The stop to which its live scene is set.
+            before: The check of another stop of the same scene, which is not used any more: its
+                scene with virtual walls serves again where they are in the same place.
+        """
         self.stop = stop
         self._lines = self._paths = NeighbourList(stop.scene)
         if stop.job.task.keep_out:
-            self._paths = NeighbourList(scene_with_keep_out(stop.job, stop.scene))
+            self._paths = _with_walls(stop, None if before is None else before._paths)
 
     def false_pieces(self, segment: Segment) -> int:
         """Return how many pieces of a segment Drake refutes."""
         neighbours = self._paths if segment.type == "move" else self._lines
         return sum(false_pieces(neighbours, self.stop.motion, curve) for curve in segment.curves)
+
+
+def _with_walls(stop: Stop, known: NeighbourList | None) -> NeighbourList:
+    """Return the neighbours in a stop's scene with virtual walls: the known ones if they serve."""
+    job, scene = stop.job, stop.scene
+    if known is not None and known.scene.spec == spec_with_keep_out(job, scene):
+        known.scene.restore(scene.positions())
+        return known
+    return NeighbourList(scene_with_keep_out(job, scene))
 
 
 def false_pieces(neighbours: NeighbourList, motion: MotionScene, curve: Curve) -> int:

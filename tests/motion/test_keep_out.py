@@ -63,6 +63,20 @@ def test_drake_refutes_a_path_through_the_wall(planned, stop):
     assert check.false_pieces(as_path) > 0
 
 
+def test_the_scene_with_walls_serves_again_where_they_are_the_same(stop):
+    scene, first = stop.scene, StopCheck(stop)
+    before = scene.positions()
+    scene.place_base(1.0, -0.5, 0.3)
+    again = StopCheck(stop, first)
+    assert again._paths is first._paths
+    np.testing.assert_array_equal(again._paths.scene.positions(), scene.positions())
+    # The person's head takes the wall along.
+    scene.set_joint("wheelchair_x", 0.05)
+    elsewhere = StopCheck(stop, again)
+    assert elsewhere._paths is not again._paths
+    scene.restore(before)
+
+
 def shaving_with(change, path):
     task = yaml.safe_load((data_folder() / "tasks" / "adl" / "shaving.yaml").read_text())
     change(task["keep_out"][0])

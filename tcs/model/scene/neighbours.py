@@ -29,9 +29,10 @@ class NeighbourList:
 
     A pair is left out only while a bound shows that it cannot come closer than required: the
     distance of boxes that enclose its shapes, along their axes, when close pairs were last sought,
-    less the motion of both bodies since, from Drake's poses. All pairs of two clusters, shapes of a
-    body that lie together, are left out by the boxes around the clusters. Drake measures all other
-    pairs at every posture. If more than the arm has moved, close pairs are sought again.
+    less the motion of both bodies since, or of one as seen from the other, from Drake's poses. All
+    pairs of two clusters, shapes of a body that lie together, are left out by the boxes around the
+    clusters. Drake measures all other pairs at every posture. If more than the arm has moved, close
+    pairs are sought again.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -56,18 +57,18 @@ class NeighbourList:
         self._of_clusters = np.maximum.reduceat(self._required, self._first)
         self._near = np.zeros(0, dtype=np.intp)
         self._bound = np.zeros(0)
+        self._near_bodies = np.zeros((0, 2), dtype=np.intp)
+        self._near_bodies_of = np.zeros(0, dtype=np.intp)
+        self._sought_apart = np.zeros((0, 3, 4))
         self._sought: FloatArray | None = None
         self._others = scene.positions_without_arm()
 
     def violations(self) -> tuple[Contact, ...]:
         """Return the same as `Scene.violations` at the current state of the scene."""
-        moved = self._moved()
-        if moved is None or moved.max() > SKIN:
-            moved = self._seek()
-        rows = self._near
-        first, second = self._body[self._pairs[rows]].T
-        limits = self._required[rows] + moved[first] + moved[second] + ROUNDING
-        close = rows[self._bound < limits]
+        rows, nearer = self._near, self._nearer()
+        if nearer is None:
+            rows, nearer = self._seek(), np.zeros(1)
+        close = rows[self._bound < self._required[rows] + nearer + ROUNDING]
         if not len(close):
             return ()
         query, parts = self.scene.query_object(), self.scene.built.parts
@@ -83,39 +84,49 @@ class NeighbourList:
             if contact[2] < self.scene.required_clearance(contact[0], contact[1])
         )
 
-    def _moved(self) -> FloatArray | None:
-        """Return how far any point of each body has moved at most since pairs were sought [m].
+    def _nearer(self) -> FloatArray | None:
+        """Return by how much near pairs may have come nearer since they were sought [m].
 
-        None if more than the arm has moved, or if they were never sought.
+        None if the arm has moved by more than `SKIN`, or anything else, or they were never sought.
         """
         others = self.scene.positions_without_arm()
         if self._sought is None or not np.array_equal(others, self._others):
             return None
+        arm, X_WB = self._arm, self._sought.copy()
+        X_WB[arm] = self._poses(arm)
         moved = np.zeros(len(self._bodies))
-        change = self._poses(self._arm) - self._sought[self._arm]
-        # The spectral norm of the difference of two rotations is their Frobenius norm / sqrt(2).
-        rotated = np.linalg.norm(change[:, :, :3], axis=(1, 2)) / np.sqrt(2.0)
-        moved[self._arm] = (
-            np.linalg.norm(change[:, :, 3], axis=1) + rotated * self._radius[self._arm]
-        )
-        return moved
+        moved[arm] = _motion(self._sought[arm], X_WB[arm], self._radius[arm])
+        if moved.max() > SKIN:
+            return None
+        first, second = self._near_bodies.T
+        X_AB = _relative(X_WB[first], X_WB[second])
+        apart = _motion(self._sought_apart, X_AB, self._radius[second])
+        return np.asarray(np.minimum(moved[first] + moved[second], apart)[self._near_bodies_of])
 
-    def _seek(self) -> FloatArray:
-        """Seek the pairs that may touch within `SKIN`; return that no body has moved since."""
+    def _seek(self) -> NDArray[np.intp]:
+        """Seek and return the numbers of the pairs that may touch within `SKIN`."""
         self._others = self.scene.positions_without_arm()
-        self._sought = self._poses(np.arange(len(self._bodies)))
+        self._sought = X_WB = self._poses(np.arange(len(self._bodies)))
         skin = 2.0 * SKIN + ROUNDING
         clusters, _ = self._around.near(
-            self._sought[self._body_of_cluster], self._clusters, self._of_clusters + skin
+            X_WB[self._body_of_cluster], self._clusters, self._of_clusters + skin
         )
         ends = np.append(self._first[1:], len(self._pairs))
         ranges = [np.arange(self._first[i], ends[i]) for i in clusters]
         rows = np.concatenate([np.zeros(0, dtype=np.intp), *ranges])
         near, self._bound = self._boxes.near(
-            self._sought[self._body], self._pairs[rows], self._required[rows] + skin
+            X_WB[self._body], self._pairs[rows], self._required[rows] + skin
         )
         self._near = rows[near]
-        return np.zeros(len(self._bodies))
+        bodies = self._body[self._pairs[self._near]]
+        # A body seen from another moves by its radius where it turns: that of the smaller one.
+        swapped = self._radius[bodies[:, 0]] < self._radius[bodies[:, 1]]
+        bodies[swapped] = bodies[swapped, ::-1]
+        self._near_bodies, of = np.unique(bodies, axis=0, return_inverse=True)
+        self._near_bodies_of = of.reshape(-1)
+        first, second = self._near_bodies.T
+        self._sought_apart = _relative(X_WB[first], X_WB[second])
+        return self._near
 
     def _poses(self, bodies: NDArray[np.intp]) -> FloatArray:
         """Return the poses of bodies in W: rotations and positions [m], shape (n, 3, 4)."""
@@ -123,6 +134,28 @@ class NeighbourList:
         return np.array(
             [plant.EvalBodyPoseInWorld(context, self._bodies[i]).GetAsMatrix34() for i in bodies]
         )
+
+
+def _motion(before: FloatArray, now: FloatArray, radius: FloatArray) -> FloatArray:
+    """Return how far any point of each body may have moved between two poses [m], shape (n,).
+
+    Args:
+        before: Poses, shape (n, 3, 4).
+        now: Poses, shape (n, 3, 4).
+        radius: Greatest distance of a point from the origin of its body [m], shape (n,).
+    """
+    change = now - before
+    # The spectral norm of the difference of two rotations is their Frobenius norm / sqrt(2).
+    rotated = np.linalg.norm(change[:, :, :3], axis=(1, 2)) / np.sqrt(2.0)
+    return np.asarray(np.linalg.norm(change[:, :, 3], axis=1) + rotated * radius)
+
+
+def _relative(X_WA: FloatArray, X_WB: FloatArray) -> FloatArray:
+    """Return X_AB of poses in W, shape (n, 3, 4)."""
+    R_AW = X_WA[:, :, :3].transpose(0, 2, 1)
+    offset = X_WB.copy()
+    offset[:, :, 3] -= X_WA[:, :, 3]
+    return np.asarray(R_AW @ offset)
 
 
 @dataclass(frozen=True, eq=False)
