@@ -53,7 +53,7 @@ def score_each(
                 scores.dexterity[i : i + 1],
                 scores.joints[i : i + 1],
             )
-            _score_slice(problem, work, search, grippers, h, h + 1, one)
+            _score_slice(problem, None, work, search, grippers, h, h + 1, one)
 
 
 class Kernel:

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.kernel.arrays import BOX, CAPSULE, FloatArray, IntArray
-from tcs.kernel.cache import jit
 from tcs.kernel.collide import BOUND, CENTRE, COLUMNS, ROTATION, ROUNDING, SIZE, TYPE
 
 CLUSTER = 12
@@ -145,8 +144,7 @@ def _box_around(rows: FloatArray) -> FloatArray:
     radius = np.where(rows[0, :, TYPE] == BOX, 0.0, rows[0, :, SIZE])
     # Of the boxes around all shapes with each orientation k among theirs.
     of = list({R_k.tobytes(): k for k, R_k in enumerate(R[0])}.values())
-    low, high = np.empty((len(of), 3)), np.empty((len(of), 3))
-    _fill_extents(np.ascontiguousarray(R[0]), p[0] - p[0, 0], half, radius, np.array(of), low, high)
+    low, high = _extents(R[0], p[0] - p[0, 0], half, radius, R[0, of])
     sizes = (high - low) / 2 + ROUNDING
     k = int(np.argmin(sizes.prod(axis=1)))
     best = np.empty((len(rows), COLUMNS))
@@ -157,38 +155,28 @@ def _box_around(rows: FloatArray) -> FloatArray:
     return best
 
 
-@jit
-def _fill_extents(
-    R: FloatArray,
-    p: FloatArray,
-    half: FloatArray,
-    radius: FloatArray,
-    of: IntArray,
-    low: FloatArray,
-    high: FloatArray,
-) -> None:
-    """Fill the extents of shapes along the axes of some of them [m].
+def _extents(
+    R: FloatArray, p: FloatArray, half: FloatArray, radius: FloatArray, axes: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the least and the greatest extents of shapes along given axes [m], shapes (m, 3).
+
+    Sums of three products one by one: products of large matrices would wake all threads of the
+    linear algebra library, which then spin, and compiled code takes a second to compile.
 
     Args:
         R: Orientations of the shapes, shape (n, 3, 3).
         p: Their centres [m], shape (n, 3).
         half: Half sizes of their cores [m], shape (n, 3).
         radius: Radii around these [m], shape (n,).
-        of: Numbers of the shapes whose axes are meant, shape (m,).
-        low: Filled, shape (m, 3).
-        high: Filled, shape (m, 3).
+        axes: The axes, as columns, shape (m, 3, 3).
     """
-    for k in range(len(of)):
-        for m in range(3):
-            x, y, z = R[of[k], 0, m], R[of[k], 1, m], R[of[k], 2, m]
-            least, most = np.inf, -np.inf
-            for n in range(len(R)):
-                spread = radius[n]
-                for r in range(3):
-                    spread += half[n, r] * abs(x * R[n, 0, r] + y * R[n, 1, r] + z * R[n, 2, r])
-                middle = x * p[n, 0] + y * p[n, 1] + z * p[n, 2]
-                least, most = min(least, middle - spread), max(most, middle + spread)
-            low[k, m], high[k, m] = least, most
+    x, y, z = (axes[:, i, :, None] for i in range(3))
+    spread = radius
+    for r in range(3):
+        along = x * R[:, 0, r] + y * R[:, 1, r] + z * R[:, 2, r]
+        spread = spread + half[:, r] * np.abs(along)
+    middle = x * p[:, 0] + y * p[:, 1] + z * p[:, 2]
+    return (middle - spread).min(axis=2), (middle + spread).max(axis=2)
 
 
 def _core(rows: FloatArray) -> FloatArray:

@@ -146,20 +146,23 @@ def _seen_from(
     frame = problem.link_frame[problem.link_groups.first[g]]
     R, p = work.link_R[frame], work.link_p[frame]
     x, y, z = p[0] - b[j, CENTRE], p[1] - b[j, CENTRE + 1], p[2] - b[j, CENTRE + 2]
+    ax, bx, cx = R[0, 0], R[0, 1], R[0, 2]
+    ay, by, cy = R[1, 0], R[1, 1], R[1, 2]
+    az, bz, cz = R[2, 0], R[2, 1], R[2, 2]
     ux, uy, uz = b[j, ROTATION], b[j, ROTATION + 3], b[j, ROTATION + 6]
     vx, vy, vz = b[j, ROTATION + 1], b[j, ROTATION + 4], b[j, ROTATION + 7]
     wx, wy, wz = b[j, ROTATION + 2], b[j, ROTATION + 5], b[j, ROTATION + 8]
     hx, hy, hz, radius = core(b, j)
     return (
-        ux * R[0, 0] + uy * R[1, 0] + uz * R[2, 0],
-        ux * R[0, 1] + uy * R[1, 1] + uz * R[2, 1],
-        ux * R[0, 2] + uy * R[1, 2] + uz * R[2, 2],
-        vx * R[0, 0] + vy * R[1, 0] + vz * R[2, 0],
-        vx * R[0, 1] + vy * R[1, 1] + vz * R[2, 1],
-        vx * R[0, 2] + vy * R[1, 2] + vz * R[2, 2],
-        wx * R[0, 0] + wy * R[1, 0] + wz * R[2, 0],
-        wx * R[0, 1] + wy * R[1, 1] + wz * R[2, 1],
-        wx * R[0, 2] + wy * R[1, 2] + wz * R[2, 2],
+        ux * ax + uy * ay + uz * az,
+        ux * bx + uy * by + uz * bz,
+        ux * cx + uy * cy + uz * cz,
+        vx * ax + vy * ay + vz * az,
+        vx * bx + vy * by + vz * bz,
+        vx * cx + vy * cy + vz * cz,
+        wx * ax + wy * ay + wz * az,
+        wx * bx + wy * by + wz * bz,
+        wx * cx + wy * cy + wz * cz,
         ux * x + uy * y + uz * z,
         vx * x + vy * y + vz * z,
         wx * x + wy * y + wz * z,

@@ -18,6 +18,7 @@ from tcs.kernel.contacts import (
 )
 from tcs.kernel.dexterity.measures import measure_at, rounded_inward
 from tcs.kernel.freedom.forms import FEWEST_JOINTS, pose_of
+from tcs.kernel.freedom.goals import FreeGoals
 from tcs.kernel.freedom.search import score_free
 from tcs.kernel.problem import Problem
 from tcs.kernel.scores import (
@@ -45,23 +46,38 @@ def gripper_contacts(problem: Problem) -> IntArray:
     if problem.joints == FEWEST_JOINTS:
         return np.full((states, poses), NO_CONTACT, np.int64)
     codes = np.empty((states, poses), np.int64)
-    _gripper_contacts(problem, new_workspace(problem), codes)
+    _gripper_contacts(problem, freedom_if_any(problem), new_workspace(problem), codes)
     return codes
 
 
+def freedom_if_any(problem: Problem) -> FreeGoals | None:
+    """Return the freedom of the goals; None leaves what is for it out of the compiled code."""
+    return problem.freedom if problem.freedom.first.size else None
+
+
 @jit
-def _gripper_contacts(owned_problem: Problem, owned_work: Workspace, codes: IntArray) -> None:
+def _gripper_contacts(
+    owned_problem: Problem, free: FreeGoals | None, owned_work: Workspace, codes: IntArray
+) -> None:
     problem, work = unowned(owned_problem), unowned(owned_work)
-    free, R, p = problem.freedom, np.empty((3, 3)), np.empty(3)
     for s in range(codes.shape[0]):
         for g in range(problem.goal_p.shape[1]):
-            if not len(free.first):
+            if free is None:
                 codes[s, g] = gripper_environment_contact(problem, work, s, g)
-                continue
-            for n in range(free.first[g + 1] - free.first[g]):
-                u = free.u[free.start[g] + n]
-                pose_of(free.form[g], u, problem.goal_R[s, g], problem.goal_p[s, g], R, p)
-                codes[s, free.first[g] + n] = gripper_contact_at(problem, work, s, R, p)
+            else:
+                _sampled_contacts(problem, free, work, s, g, codes)
+
+
+@inner
+def _sampled_contacts(
+    problem: Problem, free: FreeGoals, work: Workspace, s: int, g: int, codes: IntArray
+) -> None:
+    """Fill the contact codes of the gripper at the samples of a goal."""
+    R, p = np.empty((3, 3)), np.empty(3)
+    for n in range(free.first[g + 1] - free.first[g]):
+        u = free.u[free.start[g] + n]
+        pose_of(free.form[g], u, problem.goal_R[s, g], problem.goal_p[s, g], R, p)
+        codes[s, free.first[g] + n] = gripper_contact_at(problem, work, s, R, p)
 
 
 def blocked_grippers(problem: Problem) -> BoolArray:
@@ -105,14 +121,14 @@ def score_slice(
             where a goal is reached, `reason` and `contact` everywhere.
     """
     # Allocated here to outlive the call: the compiled code takes unowned views of these arrays.
-    _score_slice(
-        problem, new_workspace(problem), new_solver(problem), grippers, start, stop, scores
-    )
+    work, solver, free = new_workspace(problem), new_solver(problem), freedom_if_any(problem)
+    _score_slice(problem, free, work, solver, grippers, start, stop, scores)
 
 
 @jit
 def _score_slice(
     owned_problem: Problem,
+    free: FreeGoals | None,
     owned_work: Workspace,
     owned_solver: Solver,
     grippers: IntArray,
@@ -143,7 +159,7 @@ def _score_slice(
         environment_placed = False
         for g in range(problem.goal_p.shape[1]):
             scores.contact[row, g] = NO_CONTACT
-            if len(problem.freedom.first):
+            if free is not None:
                 if not environment_placed:
                     environment_in_arm_base(problem, work, torso)
                     environment_placed = True

@@ -247,6 +247,13 @@ def test_arms_with_a_closed_form_never_compile_the_numeric_code():
     assert all(b"8analytic" in content for content in analytic)
 
 
+def test_goals_that_leave_no_freedom_never_compile_the_search_over_it():
+    scores_of(toy_scene(random_arm(np.random.default_rng(0)), 0), toy_grid())
+    files = [path.read_bytes() for path in jit_folder().glob("tcs.kernel.sweep._score_slice-*")]
+    # Those of goals that leave some contain it, if any were scored before.
+    assert any(b"10score_free" not in content for content in files)
+
+
 def test_an_arm_with_a_closed_form_is_not_outside():
     scene = toy_scene(random_arm(np.random.default_rng(0)), 0)
     assert not is_outside(build_problem(scene, toy_grid()).arm)
