@@ -17,7 +17,7 @@ PRINTED = {
     "04_another_robot": r"pr2: 75%.*pr2_spoon: \d+%.*panda: \d+%",
     "05_observed_person": r"used \{'person_y': 0.0\}.*used \{'person_y': 0.1\}.*is 0.010 m from "
     r"its position at the shift \{'person_y': -0.1\}",
-    "06_robustness": r"single: 8\d\.\d%.*best: 9\d\.\d%.*: (9\d\.\d|100\.0)% estimated",
+    "06_robustness": r"single: 6\d\.\d%.*best: [78]\d\.\d%.*: (9\d\.\d|100\.0)% estimated",
     "07_explain": r"goal 0: arm_blocked, l_upper_arm_link would touch .* Raise the torso 15 cm"
     r".*goal 3: reached\ngoal 4: too_far\.",
     "08_capability_map": r"[1-9]\d* base poses reach both.*score 0\.[1-9]",
@@ -25,7 +25,7 @@ PRINTED = {
     "10_viewer_page": r"wrote .*feeding\.html, [23]\.\d MB",
     "11_drive_an_arm": r"^4\.0 s, 1\.45 m up: joint 6 is at its limit.*the tool by 0\.0\d\d mm\n"
     r"8\.\d s, 1\.5\d m up",
-    "12_turn_the_head": r"0 deg: 75% .*60 deg: 100% .*head_turn_deg",
+    "12_turn_the_head": r"0 deg: 75% .*60 deg: 88% .*head_turn_deg",
     "13_arm_on_the_wheelchair": r"^100% of the goals with the arm 0\.\d\d m ahead .* by \d+ deg$",
     "14_wash_the_trunk": r"^2\d goals, .*one base pose: 14%\nreached from two: 24%",
     "15_hold_and_wipe": r"^by both arms from one base pose: 100%\n.*20 re-checked, 0 false",
