@@ -1,11 +1,15 @@
 from __future__ import annotations
 
+import itertools
+import json
+import re
 import signal
 import socket
 import subprocess
 import sys
 import threading
 import time
+import urllib.request
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -153,8 +157,8 @@ def test_meshes_and_json_are_for_pages_only(tcs_command, saved):
 
 
 @contextmanager
-def connected_browser(port):
-    """Hold a websocket to a page open and read from it, as a browser does."""
+def connected_browser(port, page):
+    """Hold a websocket to Meshcat open and read from it, and send messages, as the page does."""
     request = (
         f"GET / HTTP/1.1\r\nHost: localhost:{port}\r\nUpgrade: websocket\r\n"
         "Connection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
@@ -167,18 +171,33 @@ def connected_browser(port):
             while browser.recv(65536):
                 pass
 
-        thread = threading.Thread(target=read)
-        thread.start()
+        left = threading.Event()
+
+        def send():
+            for number in itertools.count(1):
+                message = {"page": "test", "number": number, "held": [], "clicks": {}}
+                try:
+                    urllib.request.urlopen(f"{page}link", json.dumps(message).encode()).close()
+                except OSError:
+                    return
+                if left.wait(0.05):
+                    return
+
+        threads = [threading.Thread(target=read), threading.Thread(target=send)]
+        for thread in threads:
+            thread.start()
         try:
             yield
         finally:
+            left.set()
             browser.shutdown(socket.SHUT_RDWR)
-            thread.join()
+            for thread in threads:
+                thread.join()
 
 
 @contextmanager
 def live_page(*words):
-    """A live page in a separate process, and its port."""
+    """A live page in a separate process, the port of Meshcat, and the page's address."""
     with socket.socket() as free:
         free.bind(("localhost", 0))
         port = free.getsockname()[1]
@@ -191,14 +210,14 @@ def live_page(*words):
         for line in running.stderr:
             if "open http" in line:
                 break
-        yield running, port
+        yield running, port, re.search(r"open (http\S+)", line)[1]
 
 
 @pytest.mark.slow
 def test_ctrl_c_writes_the_run(tmp_path):
     path = tmp_path / "run.csv"
-    with live_page("--save", path, "--start-deg", *READY_DEG) as (running, port):
-        with connected_browser(port):
+    with live_page("--save", path, "--start-deg", *READY_DEG) as (running, port, page):
+        with connected_browser(port, page):
             time.sleep(1.5)
             running.send_signal(signal.SIGINT)
             running.wait(30)
@@ -215,8 +234,8 @@ def test_ctrl_c_writes_the_run(tmp_path):
 @pytest.mark.slow
 def test_the_line_is_stored_in_the_run(tmp_path):
     path = tmp_path / "run.csv"
-    with live_page("--line", "--save", path, "--duration", 3) as (running, port):
-        with connected_browser(port):
+    with live_page("--line", "--save", path, "--duration", 3) as (running, port, page):
+        with connected_browser(port, page):
             out = running.communicate(timeout=60)[0]
     assert running.returncode == 0
     course = find_course(load_arm("iiwa7"))
