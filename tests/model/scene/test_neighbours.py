@@ -72,6 +72,22 @@ def test_contacts_anywhere_are_those_of_all_pairs(robot, environment, rng):
     assert len(bodies) > 20
 
 
+def test_contacts_that_begin_before_pairs_are_sought_again_are_seen(neighbours, rng):
+    scene, new = neighbours.scene, 0
+    lower, upper = (np.clip(limit, -3.0, 3.0) for limit in scene.arm_limits)
+    for _ in range(60):
+        q = rng.uniform(lower, upper)
+        scene.set_arm(q)
+        neighbours._seek()
+        before = {c[:2] for c in scene.violations()}
+        # At most some 3 cm for each joint at a metre from it: less than the skin.
+        scene.set_arm(q + rng.choice([-0.03, 0.03]) * np.eye(7)[rng.integers(5)])
+        expected, found = scene.violations(), neighbours.violations()
+        assert [c[:2] for c in found] == [c[:2] for c in expected]
+        new += len({c[:2] for c in expected} - before)
+    assert new > 2
+
+
 def test_clusters_are_of_one_body_and_hold_each_shape_once(scene, listed):
     parts = scene.built.parts
     cluster = _clusters(listed._body, listed._boxes.X_BG[:, :, 3])
