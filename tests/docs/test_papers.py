@@ -51,10 +51,10 @@ PRINT = {
         *("I II III IV V VI II.A II.B II.C II.D II.E III.A III.B III.C IV.A IV.B V.A".split()),
         *(f"III.C.{i}" for i in range(1, 6)),
         *("IV.B.1", "IV.B.2"),
-        *appendices("A 3", "B 3 1.3", "C 4 2.4", "D 5 3.6", "E", "F 4"),
+        *appendices("A 3", "B 3 1.3", "C 4 2.4", "D 5 3.6", "E", "F 4", *"GHIJ"),
         *equations(1, 30),
-        *numbered("Figure", 1, 58),
-        *numbered("Table", 1, 7),
+        *numbered("Figure", 1, 62),
+        *numbered("Table", 1, 9),
         "Listing 1",
     ],
     "Null-space paper": [

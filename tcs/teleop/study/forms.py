@@ -265,8 +265,8 @@ def difficulty_form(condition: str) -> Form:
         condition: Its title.
 
     Source:
-        ITCM thesis, section III.C.4: agreement to a statement. It does not print the steps of the
-        scale; here there are five.
+        ITCM thesis, section III.C.4: agreement to a statement. In Appendix J participants may give
+        any positive number, without a scale; here there are five steps.
     """
     labels = ("strongly disagree", "disagree", "neither", "agree", "strongly agree")
     return Form(
