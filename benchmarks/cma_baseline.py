@@ -16,7 +16,6 @@ import numpy as np
 import tcs
 from tcs.kernel.arrays import FloatArray
 from tcs.placement.refinement import PointScorer
-from tcs.placement.refinement.objectives import TOC_TOGETHER
 from tcs.placement.refinement.space import Space
 from tcs.placement.tables import Points, tc_manipulability, tc_reachability
 
@@ -25,6 +24,9 @@ ITERATIONS, CMEAN = 10, 0.25
 SLOW_STEP = 0.005
 """Torso heights and axes of the environment are rounded to this [m or rad]: each different value
 costs a call of Drake."""
+TOC_TOGETHER = 0.95
+"""Factor of the manipulability of more than one configuration in TOC; as in hrl_base_selection in
+gt-ros-pkg/hrl-assistive (BSD), last published state."""
 UNREACHED = 10.0
 """Cost where no goal is reached, without the distance."""
 FRACTIONS = (0.25, 0.5, 1.0)

@@ -2,8 +2,8 @@
 
 Usage: python benchmarks/engines.py [--task bathing] [--environment bed] [--rounds 5] [--jobs 2]
 
-Threads, processes, and a Dask cluster of as many local workers with one thread each, in turns. The
-cluster runs already, as it would at a user's; processes are started anew. Compiled code is warm.
+Threads, and a Dask cluster of as many local workers with one thread each, in turns. The cluster
+runs already, as it would at a user's. Compiled code is warm.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from distributed import LocalCluster
 from table import header, parser, record, row, save
 
 import tcs
-from tcs.placement.scoring.engines import Dask, Processes, ScoringEngine, Threads
+from tcs.placement.scoring.engines import Dask, ScoringEngine, Threads
 
 
 def main() -> None:
@@ -32,7 +32,6 @@ def main() -> None:
     ) as cluster:
         engines: dict[str, ScoringEngine] = {
             "threads": Threads(options.jobs),
-            "processes": Processes(options.jobs),
             "dask, local workers": Dask(cluster.scheduler_address),
         }
         times: dict[str, list[float]] = {name: [] for name in engines}

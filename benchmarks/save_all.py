@@ -55,7 +55,6 @@ PARTS: dict[str, tuple[str, ...]] = {
         ),
         *("--jobs", "2"),
     ),
-    "isotropy_bound": (),
     "optimum": (),
     "surest_search": (),
     "surest_rules": (),

@@ -20,11 +20,8 @@ def refine(
     objective: Annotated[
         str,
         typer.Option(
-            metavar="score|success|margin|ball|toc",
-            help="What to maximise: P_R + P_M; the success under the errors of the environment; "
-            "the success with the base displaced by up to 5 cm and 5 deg; among the sets with the "
-            "greatest P_R, the radius of the ball of displacements in which no goal is lost; or "
-            "the score of TOC, 10 P_R + P_M, the latter times 0.95 for two or more.",
+            metavar="score|success",
+            help="What to maximise: P_R + P_M, or the success under the errors of the environment.",
         ),
     ] = "score",
     starts: Annotated[
@@ -34,8 +31,8 @@ def refine(
     samples: Annotated[
         int | None,
         typer.Option(
-            help="Number of samples of the success, for the objectives with one.",
-            show_default="64; of success and margin 2000",
+            help="Number of samples of the success.",
+            show_default="64; with the objective success 2000",
         ),
     ] = None,
     keep_success: Annotated[
@@ -51,7 +48,7 @@ def refine(
     jobs: options.Jobs = 2,
     as_json: options.Json = False,
 ) -> None:
-    """Refine the best sets between the grid points, and bound what any set could reach.
+    """Refine the best sets between the grid points.
 
     Without --observed, the sets of the nominal state are refined.
     """

@@ -127,7 +127,7 @@ def score(
     restart: options.Restart = False,
     engine: Annotated[
         str,
-        typer.Option(help="Who scores: threads, processes, or dask for the workers of a cluster."),
+        typer.Option(help="Who scores: threads, or dask for the workers of a cluster."),
     ] = "threads",
     scheduler: Annotated[
         str | None,

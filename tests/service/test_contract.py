@@ -344,7 +344,7 @@ JOBS_OF_SETS = {
     "tcs.placement.refinement.refine": (
         RefineRequest,
         {
-            "objective": "margin",
+            "objective": "success",
             "starts": 2,
             "rounds": 3,
             "samples": 4,

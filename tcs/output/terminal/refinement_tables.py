@@ -12,7 +12,7 @@ from tcs.output.words.robustness import BODY_COLLISIONS
 
 
 def report_refined(result: Mapping[str, Any]) -> None:
-    """Print the best refined set, what it gained, and what any set could gain at most."""
+    """Print the best refined set and what it gained."""
     out = results_console()
     before, after = result["before"], result["after"]
     out.print(members_table(after["members"]))
@@ -21,10 +21,7 @@ def report_refined(result: Mapping[str, Any]) -> None:
         out.print(f"{name}: {scores}")
     total = after["reachability"] + after["manipulability"]
     gain = total - before["reachability"] - before["manipulability"]
-    out.print(
-        f"P_R + P_M changes by {gain:+.4f} to {total:.4f}; no set between the grid's ends exceeds "
-        f"{result['bound']:.4f}, {result['gap']:.1%} more"
-    )
+    out.print(f"P_R + P_M changes by {gain:+.4f} to {total:.4f}")
     if result["success"] is not None:
         success = result["success"]
         cause = "with the base displaced" if result["displaced"] else "under error"
@@ -34,12 +31,6 @@ def report_refined(result: Mapping[str, Any]) -> None:
         )
         if not result["displaced"] and result["body_collisions"] != "paper":
             out.print(f"under error, collisions {BODY_COLLISIONS[result['body_collisions']]}")
-    if result.get("ball") is not None:
-        ball = result["ball"]
-        out.print(
-            f"no goal is lost with the bases displaced by up to {100.0 * ball['after']:.1f} cm, "
-            f"{100.0 * ball['before']:.1f} cm before, in {ball['samples']:,} samples"
-        )
     out.print(
         f"{result['sets']} sets refined, {result['scored']:,} configurations scored in "
         f"{result['seconds']:.1f} s; wrote {result['file']}"

@@ -1,7 +1,6 @@
 """Refinement: the best sets of a score file, moved between the grid points.
 
-In: a score file. Out: the file with refined sets beside those of its grid, and an upper bound of
-what any set could reach.
+In: a score file. Out: the file with refined sets beside those of its grid.
 """
 
 from __future__ import annotations

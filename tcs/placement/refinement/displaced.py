@@ -19,11 +19,6 @@ RADIUS = 0.05
 """Greatest displacement of the base on the floor [m]."""
 ANGLE = math.radians(5.0)
 """Greatest rotation of the base about its place [rad]."""
-BALL = 0.1
-"""Radius of the ball of displacements [m]: robots park more exactly."""
-LEVER = RADIUS / ANGLE
-"""Distance [m] that a radian of heading counts as in the ball: at this distance from the base, the
-rotation moves the arm as far."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,28 +37,6 @@ class DisplacedBases:
         turn = rng.uniform(-ANGLE, ANGLE, samples)
         offsets = [distance * np.cos(direction), distance * np.sin(direction), turn]
         return cls(scorer, np.stack(offsets, axis=1))
-
-    @classmethod
-    def in_ball(cls, scorer: PointScorer, samples: int, rng: np.random.Generator) -> Self:
-        """Return displacements that are uniform in the ball, the nearest first."""
-        direction = rng.standard_normal((samples, 3))
-        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-        size = np.sort(BALL * rng.uniform(size=samples) ** (1.0 / 3.0))
-        return cls(scorer, direction * size[:, None] / [1.0, 1.0, LEVER])
-
-    @property
-    def sizes(self) -> FloatArray:
-        """Distance of each displacement from none [m], shape (samples,)."""
-        return np.asarray(np.linalg.norm(self.offsets * [1.0, 1.0, LEVER], axis=1))
-
-    def radii(self, points: Points) -> FloatArray:
-        """Return the size of the nearest displacement at which each configuration loses a goal.
-
-        Returns:
-            Sizes [m], shape (n, G), BALL where it loses the goal in no sample.
-        """
-        sizes = np.where(self.reached(points), BALL, self.sizes[:, None])
-        return np.asarray(sizes.min(axis=1))
 
     @property
     def samples(self) -> int:

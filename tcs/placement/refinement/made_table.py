@@ -87,7 +87,6 @@ def refinement_summary(file: ScoreFile, table: int | None = None) -> dict[str, A
         raise SelectionError("No sets of this table were refined. Refine them: tcs refine FILE.")
     reachability, manipulability = scored.sets.scores_of(scored.sets.best)
     refined = scored.refined
-    total = float(refined.reachability[0] + refined.manipulability[0])
     return {
         "measure": file.metadata["measure"],
         **settings,
@@ -101,6 +100,5 @@ def refinement_summary(file: ScoreFile, table: int | None = None) -> dict[str, A
             "manipulability": round(float(refined.manipulability[0]), 12),
             "members": [member.to_json() for member in refined.members(file.configurations, 0)],
         },
-        "gap": settings["bound"] / total - 1.0,
         "sets": len(refined.origin),
     }

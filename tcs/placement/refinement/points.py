@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tcs.kernel.arrays import BoolArray, FloatArray, GridArrays, IntArray
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.scores import Scores
-from tcs.kernel.sweep import blocked_grippers, gripper_contacts, score_slice
+from tcs.kernel.sweep import gripper_contacts, score_slice
 from tcs.model.grid import ROBOT_AXES, Grid
 from tcs.model.scene import LoweredScene, Scene, environment_at, torso_at
 from tcs.placement.constraints import Footprint
@@ -167,29 +167,6 @@ class PointScorer:
         reached = found.reason == Reason.REACHED
         found.dexterity[~reached], found.joints[~reached] = 0.0, 0.0
         return found
-
-    def never_reached(self) -> BoolArray:
-        """Return the goals at which the gripper of every arm is in contact, shape (G,).
-
-        The gripper at a goal touches the environment or not whatever the base pose and the torso
-        height. With axes that move the environment, no goal counts.
-        """
-        if self.grid.environment_axes:
-            return np.zeros(self.goals, dtype=np.bool_)
-        blocked = np.ones(self.goals, dtype=np.bool_)
-        for arm in self.arms:
-            problem = self._problem(arm, np.empty((1, 0)), np.zeros(1))
-            blocked &= blocked_grippers(problem)[0]
-        return blocked
-
-    def goal_poses(self, arm: ScoredArm) -> tuple[FloatArray, FloatArray]:
-        """Return rotations and origins of the goals in W, without axes of the environment.
-
-        Returns:
-            Shapes (G, 3, 3) and (G, 3).
-        """
-        problem = self._problem(arm, np.empty((1, 0)), np.zeros(1))
-        return problem.goal_R[0], problem.goal_p[0]
 
     def _forbidden(self, points: Points) -> BoolArray:
         """Return which configurations stand on a forbidden region, shape (n,)."""

@@ -13,7 +13,6 @@ import numpy as np
 from tcs.errors import SelectionError, TcsError, UnknownNameError
 from tcs.kernel.arrays import BoolArray
 from tcs.model.random_streams import check_draws, named_generator
-from tcs.placement.refinement.bound import upper_bound
 from tcs.placement.refinement.displaced import DisplacedBases
 from tcs.placement.refinement.floor import (
     HARDEST,
@@ -24,14 +23,7 @@ from tcs.placement.refinement.floor import (
     successes,
 )
 from tcs.placement.refinement.made_table import as_table, with_estimates, with_refined
-from tcs.placement.refinement.objectives import (
-    BallObjective,
-    Features,
-    Objective,
-    Samples,
-    ScoreObjective,
-    TocObjective,
-)
+from tcs.placement.refinement.objectives import Samples, ScoreObjective
 from tcs.placement.refinement.points import PointScorer
 from tcs.placement.refinement.search import LocalSearch, Walk, without_idle_members
 from tcs.placement.refinement.space import Space
@@ -44,14 +36,8 @@ from tcs.placement.selection.choice import SelectionTables
 from tcs.placement.store import ScoreFile
 from tcs.placement.tables import Points, SetTable, tc_reachability
 
-OBJECTIVES = ("score", "success", "margin", "ball", "toc")
-"""What a refinement maximises: P_R + P_M, the success under the errors of the environment, the
-success with the base displaced, the radius within which a displaced base loses no goal, or the
-score of TOC."""
-BY_SUCCESS = ("success", "margin")
-"""Objectives that are the success in samples."""
-WITHOUT_SAMPLES = ("score", "toc")
-"""Objectives that depend on the scores alone."""
+OBJECTIVES = ("score", "success")
+"""What a refinement maximises: P_R + P_M, or the success under the errors of the environment."""
 MOST_STARTS = 50
 """Greatest number of sets to start from."""
 MOST_ROUNDS = 1000
@@ -65,7 +51,7 @@ STREAM = "refinement"
 SAMPLES_STREAM = "refinement samples"
 """Name of the random stream of the samples of the success."""
 SAMPLES = 64
-"""Samples of the success that a set must keep, and displacements of the ball."""
+"""Samples of the success that a set must keep."""
 SURE_SAMPLES = 2000
 """Samples of an objective that is a success: fewer are soon satisfied by sets next to a loss."""
 FRESH_SAMPLES = 500
@@ -101,15 +87,13 @@ def refine(
 
     Args:
         file: A score file, which is not modified.
-        objective: "score", P_R + P_M; "success", the mean of P_R under the errors of the
-            environment; "margin", the mean of P_R with the base displaced by up to 5 cm and
-            5 deg; "ball", among the sets with the greatest P_R the radius of the largest ball of
-            displacements of the bases in which no goal is lost; or "toc", 10 P_R + P_M, the latter
-            times 0.95 for a set of two or more. The samples are the same for all configurations.
+        objective: "score", P_R + P_M; or "success", the mean of P_R under the errors of the
+            environment. The samples are the same for all configurations. Where the environment
+            has no errors, they displace the base by up to 5 cm and 5 deg.
         starts: Number of sets to start from; up to three single configurations come on top.
         rounds: Greatest number of rounds of the search.
-        samples: Number of samples of the success; by default 2,000 for the objectives that are a
-            success, 64 for the others.
+        samples: Number of samples of the success; by default 2,000 for the objective "success",
+            64 for the other.
         keep_success: Whether, with the objective "score", a set must be at least as sure under
             the errors of the environment (of the base, if it has none) as the best set of the
             grid, in the hardest of the samples and in others that judge the result.
@@ -131,7 +115,7 @@ def refine(
         SelectionError: If no configuration reaches a goal, or there is no such table.
         TcsError: If a number is out of range.
     """
-    by_success = objective in BY_SUCCESS
+    by_success = objective == "success"
     if samples is None:
         samples = SURE_SAMPLES if by_success else SAMPLES
     check_draws(samples, seed)
@@ -151,9 +135,8 @@ def refine(
     scorer = PointScorer.of(file, number, jobs)
     scorer.warm_up(on_compile)
     sets = file.tables[number].sets
-    is_scored = objective in WITHOUT_SAMPLES
     trials = Trials.built(file, number, scorer.built, body_collisions=body_collisions)
-    draw = _samples(trials, scorer, objective, seed)
+    draw = _samples(trials, scorer, seed)
     drawn = draw(samples, SAMPLES_STREAM)
     # Rails run along x of the mount; beside them there is nothing to bolt a robot to.
     rails = ("base_y",) if file.environment.get("mount") else ()
@@ -166,9 +149,9 @@ def refine(
         triples = surest_triples(staged, search, sets, pairs)
         starts_at = list(dict.fromkeys([*starting_sets(file, number, 1), *pairs, *triples]))
     else:
-        search = LocalSearch(scorer, space, _objective(objective, sets, drawn), rng)
+        search = LocalSearch(scorer, space, ScoreObjective(sets.weights), rng)
         starts_at = starting_sets(file, number, starts)
-    keep = objective == "score" and keep_success
+    keep = keep_success and not by_success
     if keep:
         hardest = _floor(search, drawn.hardest(-(-samples // HARDEST)), sets)
         search = dataclasses.replace(search, keeps=hardest.keeps)
@@ -190,8 +173,7 @@ def refine(
     first = without_idle_members(walks[0], search.objective, needed)
     walks = [first, *walks[1:]]
     refined = with_estimates(file, number, scorer, as_table(walks, sets.weights))
-    success = None if is_scored and not keep else _success(search, walks[0], fresh, sets)
-    ball = _ball(search, walks[0], judging, sets) if objective == "ball" else None
+    success = _success(search, walks[0], fresh, sets) if keep or by_success else None
     settings = {
         "program_version": version("tcs"),
         "objective": objective,
@@ -204,8 +186,6 @@ def refine(
         "seed": seed,
         "scored": scored,
         "success": success,
-        "ball": ball,
-        "bound": upper_bound(file, number, scorer),
         "seconds": time.perf_counter() - begun,
     }
     return with_refined(file, number, refined, settings)
@@ -241,35 +221,20 @@ def starting_sets(file: ScoreFile, table: int, count: int) -> list[tuple[int, ..
     return [start for start in dict.fromkeys(found) if start]
 
 
-def _samples(
-    trials: Trials, scorer: PointScorer, objective: str, seed: int
-) -> Callable[[int, str], Samples]:
+def _samples(trials: Trials, scorer: PointScorer, seed: int) -> Callable[[int, str], Samples]:
     """Return a function that draws samples, given their number and the name of the stream.
 
-    They are errors of the environment; displacements of the base for the objectives "margin" and
-    "ball", and where no joint of the environment has an error.
+    They are errors of the environment; displacements of the base where no joint of the environment
+    has an error.
     """
 
     def drawn(samples: int, stream: str) -> Samples:
-        if objective == "ball":
-            return DisplacedBases.in_ball(scorer, samples, named_generator(seed, stream))
-        if objective == "margin" or (objective in WITHOUT_SAMPLES and not trials.errors.errors):
+        if not trials.errors.errors:
             return DisplacedBases.drawn(scorer, samples, named_generator(seed, stream))
         offsets = trials.errors.draw(samples, seed, stream=stream)
         return PerturbedPoints(trials, offsets, scorer.jobs)
 
     return drawn
-
-
-def _objective(name: str, sets: SetTable, drawn: Samples) -> Objective:
-    """Return one of the objectives."""
-    if name == "score":
-        return ScoreObjective(sets.weights)
-    if name == "toc":
-        return TocObjective(sets.weights)
-    if name == "ball" and isinstance(drawn, DisplacedBases):
-        return BallObjective(sets.weights, drawn)
-    raise UnknownNameError("objective", name, OBJECTIVES, where="refine")
 
 
 def _floor(search: LocalSearch, samples: Samples, sets: SetTable) -> SuccessFloor:
@@ -296,17 +261,3 @@ def _success(
         reached = np.logical_or.reduce(fresh.reached(points), axis=0)
         of_sets.append(float(tc_reachability(reached, sets.weights).mean()))
     return {"before": of_sets[0], "after": of_sets[1], "samples": fresh.samples}
-
-
-def _ball(
-    search: LocalSearch, walk: Walk, fresh: Samples, sets: SetTable
-) -> dict[str, float | int]:
-    """Return the radius of the ball [m] of the grid's best set and of a refined set."""
-    judge = _objective("ball", sets, fresh)
-    assert isinstance(judge, BallObjective)
-    radii = []
-    for points in (search.points_of(sets.best), walk.present.points):
-        features = judge.features(points, search.scorer.score(points))
-        of_set = Features(features.reached[None], features.dexterity[None])
-        radii.append(float(judge.radius(of_set)[0]))
-    return {"before": radii[0], "after": radii[1], "samples": fresh.samples}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tcs.kernel.arrays import BoolArray
 from tcs.model.grid import Grid
-from tcs.placement.refinement.objectives import Features, Objective
+from tcs.placement.refinement.objectives import Features, ScoreObjective
 from tcs.placement.refinement.points import PointScores
 from tcs.placement.refinement.space import Space
 from tcs.placement.tables import Points
@@ -123,7 +123,7 @@ class LocalSearch:
 
     scorer: Scorer
     space: Space
-    objective: Objective
+    objective: ScoreObjective
     rng: np.random.Generator
     keeps: SetCondition | None = None
     """SetCondition of the sets that walks move to, checked for few of them; None for none."""
@@ -297,7 +297,7 @@ class LocalSearch:
 
 
 def without_idle_members(
-    walk: Walk, objective: Objective, keeps: SetCondition | None = None
+    walk: Walk, objective: ScoreObjective, keeps: SetCondition | None = None
 ) -> Walk:
     """Return a walk without members that add nothing to the objective; itself if all add something.
 

@@ -306,7 +306,7 @@ def score(
             file records why not (`no_approach`).
         blocks: Folder in which finished blocks of the grid are kept, so that the same call
             continues after the process was killed; see `tcs.placement.scoring.BlockFolder`.
-        engine: Who scores: `Threads`, `Processes` or `Dask` of `tcs.placement.scoring.engines`; by
+        engine: Who scores: `Threads` or `Dask` of `tcs.placement.scoring.engines`; by
             default `jobs` threads. The scores are the same.
         **sets: Options of the kept sets: `rule`, `same_environment`, `max_members`,
             `min_distance`; see `tcs.placement.scoring.SetOptions`.

@@ -26,7 +26,6 @@ from tcs.placement.selection.observed import Match, nearest_table
 from tcs.placement.selection.penalties import Penalties, penalties_of
 from tcs.placement.selection.refined import RefinedQuery, grid_only
 from tcs.placement.selection.search import best_set
-from tcs.placement.selection.starts import starts_of
 from tcs.placement.selection.travel import Legs, TravelWeights, legs_from, shortest_tour
 from tcs.placement.selection.utility import UtilityWeights, utility
 from tcs.placement.store import MotionFile, ScoreFile
@@ -228,11 +227,6 @@ class _Query:
             return best_estimated(
                 sets, self.tables.success, legs, weights, self.max_members, candidates
             )
-        if distinct is None and self.found is None:
-            starts = starts_of(self.tables.index, legs, weights, self.penalties)
-            shared = None if starts is None else starts.best(legs.here_to_cell, self.max_members)
-            if shared is not None:
-                return shared
         singles = self.singles.copy()
         if distinct is not None:
             singles[~distinct.of_sets((np.arange(singles.size),))] = -np.inf

@@ -31,7 +31,6 @@ from tcs.placement.robustness import PerturbedPoints, Trials, success_summary
 from tcs.placement.store.encoding import decode, encode
 from tcs.placement.tables import Points, Reason, RefinedSet, RefinedSuccess
 from tests.beside import BESIDE
-from tests.chosen import some_of
 
 NAMES, ONE = ("mean", "low", "high"), np.array([0.5])
 HERE = tcs.InitialConfiguration(base_x=1.4, base_y=-1.2, base_yaw=3.14, torso=0.15)
@@ -59,25 +58,15 @@ def test_scores_at_grid_points_are_those_of_the_grid(scored):
     np.testing.assert_array_equal(found.joints[found.reached], scores.arm_joints)
 
 
-def test_a_refined_set_is_not_worse_and_below_the_bound(refined):
+def test_a_refined_set_is_not_worse(refined):
     found = refinement_summary(refined)
     totals = [
         found[key]["reachability"] + found[key]["manipulability"] for key in ("before", "after")
     ]
-    assert totals[0] < totals[1] <= found["bound"]
+    assert totals[0] < totals[1]
     table = refined.nominal.refined
     assert np.all(np.diff(table.objective) <= 0.0)
     np.testing.assert_allclose(table.reachability + table.manipulability, table.objective)
-
-
-def test_random_configurations_stay_below_the_bound(scored, refined, rng):
-    scorer, space = PointScorer.of(scored, 0), Space.of(scored.configurations, scored.nominal.sets)
-    values = rng.uniform(space.low, space.high, (400, space.low.size))
-    values[:, -1] = values[:4, -1].repeat(100)  # each torso height costs a call of Drake
-    found = scorer.score(Points(values, np.zeros(len(values), dtype=np.int64)))
-    # Together they are a set of 400 members.
-    together = found.reached.any(axis=0).mean() + found.dexterity.max(axis=0).mean()
-    assert 1.0 < together <= refinement_summary(refined)["bound"]
 
 
 def test_members_stay_between_the_ends_of_the_axes(refined):
@@ -390,30 +379,13 @@ def test_success_counts_the_collisions_that_were_asked_for(scored, monkeypatch, 
     assert before["none"] > before["paper"]
 
 
-@pytest.mark.parametrize("objective", some_of(["success", "margin", "ball"], "success"))
-def test_success_is_judged_on_other_samples(scored, monkeypatch, objective):
+def test_success_is_judged_on_other_samples(scored, monkeypatch):
     monkeypatch.setattr("tcs.placement.refinement.refined_file.FRESH_SAMPLES", 200)
-    found = tcs.refine(scored, objective=objective, starts=1, rounds=1, samples=2)
+    found = tcs.refine(scored, objective="success", starts=1, rounds=1, samples=2)
     found = refinement_summary(found)
     assert found["success"]["samples"] == 200
     assert 0.0 < found["success"]["before"] < 1.0
     assert 0.0 < found["success"]["after"] < 1.0
-    assert (found["ball"] is not None) == (objective == "ball")
-
-
-def test_the_ball_grows(scored, monkeypatch):
-    monkeypatch.setattr("tcs.placement.refinement.refined_file.FRESH_SAMPLES", 100)
-    refined = tcs.refine(scored, objective="ball", starts=1, rounds=3, samples=32)
-    found = refinement_summary(refined)
-    assert found["ball"]["after"] > found["ball"]["before"]
-    assert found["after"]["reachability"] >= found["before"]["reachability"]
-
-
-def test_the_score_of_toc_is_that_of_the_set(scored):
-    refined = tcs.refine(scored, objective="toc", starts=1, rounds=1).nominal.refined
-    factor = np.where(refined.sizes > 1, 0.95, 1.0)
-    expected = 10.0 * refined.reachability + factor * refined.manipulability
-    np.testing.assert_allclose(refined.objective, expected)
 
 
 @pytest.mark.parametrize(

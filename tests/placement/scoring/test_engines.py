@@ -1,9 +1,5 @@
 """Engines: the same scores by each of them, also if workers end or cannot be reached."""
 
-import logging
-import os
-import signal
-
 import numpy as np
 import pytest
 
@@ -14,7 +10,6 @@ from tcs.placement.scoring.engines import (
     ENGINES,
     Dask,
     Part,
-    Processes,
     Threads,
     Work,
     engine_named,
@@ -61,37 +56,10 @@ def cluster():
 
 @pytest.fixture(params=ENGINES)
 def engine(request):
-    """Each engine; of the processes one is killed in the middle, so that it is replaced."""
+    """Each engine."""
     if request.param == "dask":
         return Dask(request.getfixturevalue("cluster").scheduler_address, length=PART)
-    if request.param == "threads":
-        return Threads(2, length=PART)
-    request.getfixturevalue("one_process_ends")
-    return Processes(2, length=PART)
-
-
-def end_oneself(_part):
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
-@pytest.fixture
-def one_process_ends(monkeypatch, caplog):
-    """Kill the process that gets the third part, once."""
-    from tcs.placement.scoring.engines import local
-
-    submitted, killed = local._submitted, []
-
-    def once_deadly(pool, part):
-        if part.start >= 2 * PART and not killed:
-            killed.append(part)
-            return pool.submit(end_oneself, part)
-        return submitted(pool, part)
-
-    monkeypatch.setattr(local, "_submitted", once_deadly)
-    with caplog.at_level(logging.WARNING):
-        yield
-    assert killed
-    assert any("is scored again" in one.getMessage() for one in caplog.get_records("call"))
+    return Threads(2, length=PART)
 
 
 def test_every_engine_gives_the_same_bytes(engine, lowered, small_job, excluded, plain):
@@ -109,18 +77,6 @@ def test_every_engine_gives_the_same_bytes(engine, lowered, small_job, excluded,
     size = small_job.grid.size
     assert len(done) == -(-size // PART)
     assert done[-1] == (size, size)
-
-
-def test_no_parts_need_no_worker():
-    assert list(Processes(2).scored(None, [])) == []
-
-
-def test_processes_that_always_end_are_told(work, monkeypatch):
-    from tcs.placement.scoring.engines import local
-
-    monkeypatch.setattr(local, "_submitted", lambda pool, part: pool.submit(end_oneself, part))
-    with pytest.raises(TcsError, match="ended before one of them had finished a part"):
-        list(Processes(1).scored(work, [Part(0, PART)]))
 
 
 def test_a_cluster_that_cannot_be_reached_is_told(monkeypatch, work):
@@ -167,7 +123,6 @@ def test_another_kernel_is_refused(work):
 
 def test_engines_by_name():
     assert engine_named("threads", jobs=2) == Threads(2)
-    assert engine_named("processes", jobs=3) == Processes(3)
     assert engine_named("dask", jobs=2, scheduler="tcp://a:1") == Dask("tcp://a:1")
     with pytest.raises(UnknownNameError, match="unknown engine 'thread'"):
         engine_named("thread", jobs=2)
@@ -175,6 +130,5 @@ def test_engines_by_name():
         engine_named("dask", jobs=2)
     with pytest.raises(TcsError, match="has no scheduler"):
         engine_named("threads", jobs=2, scheduler="tcp://a:1")
-    for engine in (Threads, Processes):
-        with pytest.raises(TcsError, match="jobs is 0"):
-            engine(0)
+    with pytest.raises(TcsError, match="jobs is 0"):
+        Threads(0)

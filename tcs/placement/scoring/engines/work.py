@@ -1,15 +1,17 @@
-"""Scores of a part of the grid, wherever they are computed."""
+"""Scores of a part of the grid, wherever they are computed; threads compute them here."""
 
 from __future__ import annotations
 
 import hashlib
 import pickle
 from collections.abc import Generator, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
 import numpy as np
+from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from tcs.errors import TcsError
@@ -114,6 +116,33 @@ class ScoringEngine(Protocol):
         Raises:
             TcsError: If the workers cannot be reached, or are lost with no part finished meanwhile.
         """
+
+
+@dataclass(frozen=True, slots=True)
+class Threads:
+    """Threads of this process, in which the kernel runs side by side."""
+
+    jobs: int
+    """Number of threads."""
+    length: int = SLICE
+    """As in `ScoringEngine`."""
+
+    def __post_init__(self) -> None:
+        """Raise TcsError if there is no thread."""
+        if self.jobs < 1:
+            raise TcsError(f"jobs is {self.jobs}; must be 1 or more threads.")
+
+    def scored(
+        self, work: Work, parts: Sequence[Part]
+    ) -> Generator[tuple[Part, Block], None, None]:
+        """As in `ScoringEngine`."""
+        yield from Parallel(n_jobs=self.jobs, prefer="threads", return_as="generator")(
+            delayed(_with_part)(work, part) for part in parts
+        )
+
+
+def _with_part(work: Work, part: Part) -> tuple[Part, Block]:
+    return part, work.score(part)
 
 
 class PackedWork(NamedTuple):
