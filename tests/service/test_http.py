@@ -194,6 +194,39 @@ def test_pages_of_other_servers_are_refused(http):
     refused(http.get("/v1", headers={"Host": "evil.example"}), 403)
 
 
+@pytest.mark.parametrize("site", ["cross-site", "same-site"])
+def test_what_pages_of_other_servers_embed_or_open_is_refused(http, site):
+    # A browser sends no Origin with pictures, frames and links.
+    fetched = {"Sec-Fetch-Site": site, "Sec-Fetch-Dest": "iframe"}
+    for path in (f"/v1/files/{'0' * 64}/report", f"/v1/files/{'0' * 64}/view", "/docs", "/"):
+        refused(http.get(path, headers=fetched), 403)
+    # A shared link to the page may stand anywhere; this server has no page.
+    refused(http.get("/", headers={**fetched, "Sec-Fetch-Dest": "document"}), 404)
+    refused(http.get("/v1/files", headers={**fetched, "Sec-Fetch-Dest": "document"}), 403)
+    assert http.get("/v1", headers={"Sec-Fetch-Site": "same-origin"}).status_code == 200
+    assert http.get("/v1", headers={"Sec-Fetch-Site": "none"}).status_code == 200
+
+
+def test_pages_run_nothing_that_asks_or_sends(http, engine, valid, monkeypatch):
+    page = "<!doctype html><script>1</script>"
+    monkeypatch.setattr(engine, "report_of", lambda file: page)
+    monkeypatch.setattr(engine, "view_of", lambda file: page)
+    policies = {
+        path: http.get(path).headers["content-security-policy"]
+        for path in (
+            "/v1", "/docs", f"/v1/files/{valid['file']}/report", f"/v1/files/{valid['file']}/view",
+            "/v1/files/" + "0" * 64,
+        )
+    }  # fmt: skip
+    for path, policy in policies.items():
+        assert policy.startswith("default-src 'none'; "), path
+        # Without an origin, a script in the page can ask nothing of this server.
+        assert "sandbox" in policy, path
+        assert "allow-same-origin" not in policy, path
+        assert "http" not in policy, path
+        assert ("connect-src data: blob:" in policy) == path.endswith("/view")
+
+
 def test_token(engine, valid):
     access = Access(token=TOKEN)
     with Server(make_application(engine, access), host="127.0.0.1", port=0) as server:

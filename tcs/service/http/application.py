@@ -32,6 +32,16 @@ _ABOUT = (
 _BEAT = 10.0
 """Longest time between two events of a stream [s]."""
 _FILE, _JSON = "application/octet-stream", "application/json"
+_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'{more}; style-src 'unsafe-inline'; "
+    "img-src data: blob:; font-src data:; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'self'; sandbox allow-scripts allow-popups allow-downloads allow-modals"
+)
+"""Of a page whose scripts are in itself. It has no origin, so that a text of a score file that were
+run in it could neither ask this service nor send anything elsewhere."""
+_REPORT = {"Content-Security-Policy": _POLICY.format(more="")}
+_VIEW = {"Content-Security-Policy": _POLICY.format(more="; connect-src data: blob:")}
+"""Meshcat fetches its scene out of the page."""
 
 
 class PlainRoute(APIRoute):
@@ -127,14 +137,15 @@ def _add_files(app: FastAPI, engine: Engine) -> None:
         return Response(content, media_type=_FILE)
 
     async def view(file: str) -> Response:
-        return HTMLResponse(await anyio.to_thread.run_sync(engine.view_of, file))
+        return HTMLResponse(await anyio.to_thread.run_sync(engine.view_of, file), headers=_VIEW)
 
     async def environment(file: str) -> Response:
         text = await anyio.to_thread.run_sync(engine.environment_of, file)
         return Response(text, media_type="application/yaml")
 
     async def report(file: str) -> Response:
-        return HTMLResponse(await anyio.to_thread.run_sync(engine.report_of, file))
+        content = await anyio.to_thread.run_sync(engine.report_of, file)
+        return HTMLResponse(content, headers=_REPORT)
 
     body = {"required": True, "content": {_FILE: {"schema": {"type": "string"}}}}
     _route(app, "GET", "/v1/list", known, "List tasks, environments and robots.")
@@ -221,7 +232,7 @@ def _add_description(app: FastAPI, engine: Engine) -> None:
         return _json(openapi())
 
     async def page() -> Response:
-        return HTMLResponse(description.page(openapi()))
+        return HTMLResponse(description.page(openapi()), headers=_REPORT)
 
     async def about() -> Response:
         from tcs import __version__

@@ -23,6 +23,8 @@ _HEADERS = (
     (b"referrer-policy", b"no-referrer"),
     (b"x-frame-options", b"SAMEORIGIN"),
 )
+_POLICY = (b"content-security-policy", b"default-src 'none'; frame-ancestors 'none'; sandbox")
+"""Of a response that states none: nothing in it is run, wherever its texts come from."""
 _LOG = logging.getLogger(__name__)
 
 
@@ -75,7 +77,10 @@ class Guard:
             nonlocal begun
             if message["type"] == "http.response.start":
                 begun = True
-                message["headers"] = [*message.get("headers", ()), *_HEADERS]
+                headers = [*message.get("headers", ()), *_HEADERS]
+                if all(name.lower() != _POLICY[0] for name, _ in headers):
+                    headers.append(_POLICY)
+                message["headers"] = headers
             await send(message)
 
         try:
@@ -99,7 +104,9 @@ class Guard:
             text = "this server answers requests to this machine's own address only."
             return problem(403, "Forbidden", text)
         origin = headers.get(b"origin")
-        if origin is not None and origin.partition("://")[2] != host:
+        if _is_from_elsewhere(scope["path"], headers) or (
+            origin is not None and origin.partition("://")[2] != host
+        ):
             return problem(403, "Forbidden", "this server does not answer pages of other servers.")
         if self._access.token is not None and not self._has_token(headers):
             text = "the request lacks the token: Authorization: Bearer TOKEN."
@@ -115,6 +122,16 @@ class Guard:
         return scheme.lower() == "bearer" and secrets.compare_digest(
             given.strip().encode("utf-8", "replace"), expected
         )
+
+
+def _is_from_elsewhere(path: str, headers: dict[bytes, str]) -> bool:
+    """Return whether a page of another server asks, as the browser says.
+
+    It names no origin where such a page embeds this one, or links to it. A link to the page at `/`
+    is followed: a shared one may stand anywhere, and the page asks for the rest by itself.
+    """
+    is_link = path == "/" and headers.get(b"sec-fetch-dest") == "document"
+    return headers.get(b"sec-fetch-site") in ("cross-site", "same-site") and not is_link
 
 
 def _name_of(host: str) -> str:
