@@ -212,6 +212,38 @@ def test_goals_keep_their_distance_from_the_padded_skin(name):
     assert goals_on_person(task, file) is task
 
 
+def nearest_of_all(shapes, point):
+    """Return the signed distance from the nearest of some shapes, and its normal, in the link."""
+    found = [(*shape.nearest(point)[::2], shape.R_LS) for shape in shapes]
+    distance, normal, R_LS = min(found, key=lambda one: one[0])
+    return distance, R_LS @ normal
+
+
+@pytest.mark.parametrize("who", ["6", "10", "stout-woman"])
+def test_goals_are_not_turned_against_the_skin(who):
+    """The angle of x of the tool with the normal of the nearest shape is that on the papers' man.
+
+    Within 5 degrees: a thigh of other proportions is two capsules side by side.
+    """
+    person = PEOPLE.get(who) or Person(sex="female", age=float(who))
+    for name in ("shaving", "bathing"):
+        task = load_task(name)
+        file = load_environment(task.environments[0])
+        environment, shapes_of = with_person(file, person), person_shapes(file)
+        scales = scales_of(environment)
+        for before, after in zip(task.goals, goals_on_person(task, environment).goals, strict=True):
+            link = file.body_frames[before.body_frame]
+            covers = covers_of(environment, link, shapes_of[link], scales[link])
+            resized = [one for covering in covers for one in covering]
+            grown = padding_of(environment, link, scales) - file.padding[link]
+            x = Rotation.from_quat(after.quaternion, scalar_first=True).as_matrix()[:, 0]
+            least, of_man = nearest_of_all(shapes_of[link], before.position)
+            distance, normal = nearest_of_all(resized, after.position)
+            turned = np.arccos(x @ normal) - np.arccos(x @ of_man)
+            assert abs(np.degrees(turned)) < 5.0, before.name
+            assert distance >= least + grown - 1e-12
+
+
 @pytest.mark.parametrize("is_box", [True, False], ids=["box", "capsule"])
 def test_points_lead_back_from_their_nearest_point_of_the_surface(is_box):
     generator = np.random.default_rng(0)

@@ -15,14 +15,21 @@ from tcs.model.scene.person.resized import covers_of, padding_of, person_shapes,
 from tcs.model.scene.person.shapes import LinkShape
 from tcs.model.tasks import Goal, Task
 
+CLEAR = 0.002
+"""How much farther than the nearest shape of its link the others have to stay from a goal [m]."""
+STIFF = 0.01
+"""Weight of the motion along the skin against what is missing to these distances: a tenth of it is
+left where normals differ by 20 degrees."""
+
 
 def goals_on_person(task: Task, environment: EnvironmentFile) -> Task:
     """Return a task with its goals moved to the body of the person of an environment.
 
     A goal on a link of the person belongs to the nearest point of the link's shapes. On the resized
     link it is beside where this point is mapped to, in the same direction, and as far in that
-    direction from the padded shapes that enclose the mapped one; its orientation in the body frame
-    and its straight motions stay.
+    direction from the padded shapes that enclose the mapped one. Where another shape of the link
+    would be nearer, so that the skin beside the goal would be another, the goal moves along the
+    skin, away from that shape. Its orientation in the body frame and its straight motions stay.
 
     Args:
         task: A task for the papers' man.
@@ -50,24 +57,27 @@ def goals_on_person(task: Task, environment: EnvironmentFile) -> Task:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Anchor:
-    """The point of a link's shapes that a goal belongs to."""
+    """The place of a goal among the shapes of its link, of which it belongs to the nearest."""
 
     shape: int
     """Number of the nearest shape of the link of the papers' man."""
-    distance: float
-    """Signed distance of the goal from it [m]."""
+    distances: FloatArray
+    """Signed distances of the goal from all shapes of the link [m], shape (shapes,)."""
     surface: FloatArray
-    """The point, in the frame of the link [m], shape (3,)."""
-    normal: FloatArray
-    """Outward normal there, in the frame of the link, shape (3,)."""
+    """The nearest point, in the frame of the link [m], shape (3,)."""
+    normals: FloatArray
+    """Outward normals at the nearest points of all shapes, in the frame of the link, shape
+    (shapes, 3)."""
 
     @classmethod
     def of(cls, goal: Goal, shapes: Sequence[LinkShape]) -> Self:
         """Return the anchor of a goal on the shapes of its link."""
         near = [shape.nearest(goal.position) for shape in shapes]
-        number = min(range(len(near)), key=lambda i: near[i][0])
-        shape, (distance, surface, normal) = shapes[number], near[number]
-        return cls(number, distance, shape.p_LoSo_L + shape.R_LS @ surface, shape.R_LS @ normal)
+        distances = np.array([distance for distance, _, _ in near])
+        number = int(np.argmin(distances))
+        surface = shapes[number].p_LoSo_L + shapes[number].R_LS @ near[number][1]
+        normals = [shape.R_LS @ normal for shape, (_, _, normal) in zip(shapes, near, strict=True)]
+        return cls(number, distances, surface, np.array(normals))
 
     def position(
         self, scale: ArrayLike, covers: Sequence[Sequence[LinkShape]], padding: ArrayLike
@@ -79,8 +89,21 @@ class Anchor:
             covers: What encloses each of its shapes.
             padding: By how much the padding of the link grows [m], shape (...).
         """
-        mapped = np.array(scale) * self.surface
-        outward = np.max([shape.reach(self.normal) for shape in covers[self.shape]], axis=0)
-        beyond = outward - np.vecdot(mapped, self.normal)
-        distance = np.asarray(beyond + self.distance + padding)
-        return np.asarray(mapped + distance[..., None] * self.normal)
+        normal, mapped = self.normals[self.shape], np.array(scale) * self.surface
+        # Height of the goal over the origin of the link, along the normal of each shape.
+        outward = [
+            np.max([one.reach(along) for one in cover], axis=0)
+            for along, cover in zip(self.normals, covers, strict=True)
+        ]
+        least = np.minimum(self.distances, self.distances[self.shape] + CLEAR)
+        height = np.stack(np.broadcast_arrays(*outward), axis=-1) + least
+        height = height + np.asarray(padding)[..., None]
+        beyond = height[..., self.shape] - np.vecdot(mapped, normal)
+        position = mapped + beyond[..., None] * normal
+        # Least squares along the skin, over the shapes that are nearer than they may be.
+        missing = np.maximum(height - np.matvec(self.normals, position), 0.0)
+        across = self.normals - np.outer(self.normals @ normal, normal)
+        away = np.where(missing[..., None] > 0.0, across, 0.0)
+        lhs = np.swapaxes(away, -1, -2) @ away + STIFF * np.eye(3)
+        along = np.linalg.solve(lhs, np.vecmat(missing, away)[..., None])
+        return np.asarray(position + along[..., 0])
