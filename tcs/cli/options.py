@@ -359,15 +359,15 @@ class CheckOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class WindowOptions:
-    """A viewer in the browser."""
+    """A page in the browser."""
 
     port: Annotated[
         int | None,
         typer.Option(
             min=1024,
             max=65535,
-            help="Port of the viewer.",
-            show_default="the first free one from 7000 on",
+            help="Port of the page, on this machine; its address is printed.",
+            show_default="a free one",
         ),
     ] = None
     browser: Annotated[bool, typer.Option(help="Whether to open a browser.")] = True

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 import tcs.capability
@@ -71,3 +73,24 @@ def test_a_command_rarely_searches_its_modules_for_garbage(process):
     # 27 of them before the command line begins; by thresholds of Python, 138.
     assert int(searches) < 60
     assert is_frozen == "True"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+@pytest.mark.parametrize(
+    ("words", "redirect", "code", "line"),
+    [
+        # A table, large and small outputs; a line of an error; and closed instead of full.
+        *((words, "dup2(full, 1)", 1, True) for words in (["list"], ["list", "--json"])),
+        (["--version"], "dup2(full, 1)", 1, True),
+        (["check", "/nowhere"], "dup2(full, 2)", 1, False),
+        (["list"], "close(1)", 0, False),
+    ],
+    ids=["table", "json", "version", "error", "closed"],
+)
+def test_an_output_that_takes_nothing_is_one_line(process, words, redirect, code, line):
+    # As a shell does it, before Python begins.
+    full = "full = os.open('/dev/full', os.O_WRONLY)"
+    again = "os.execv(sys.executable, [sys.executable, '-m', 'tcs', *sys.argv[1:]])"
+    ran = process(*words, before=f"import os; {full}; os.{redirect}; {again}")
+    text = "tcs: the output cannot be written: No space left on device.\n"
+    assert (ran.code, ran.out, ran.err) == (code, "", text if line else "")
