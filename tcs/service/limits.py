@@ -25,6 +25,8 @@ class Limits:
     """Threads of a job; the results do not depend on it."""
     request_bytes: int = 1024**2
     """Most bytes of a request other than a score file."""
+    content_bytes: int = 256 * 1024**2
+    """Most bytes of the contents of all requests that arrive or are answered at the same time."""
     requests_at_once: int = 128
     """Most requests that are answered at the same time."""
     request_seconds: float = 30.0

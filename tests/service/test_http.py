@@ -16,9 +16,9 @@ from tcs.errors import OutputError, ServiceError
 from tcs.placement.store import save_scores
 from tcs.service import Engine, Limits, SelectRequest
 from tcs.service.client import Client
-from tcs.service.http import Access, Server, checked_access, make_application
+from tcs.service.http import Access, Server, checked_access, make_application, protocol
 from tcs.service.http.file_queues import QUEUES, QUICK, STREAK, FileQueues
-from tcs.service.http.protocol import MOST_HEAD_BYTES, BoundedProtocol
+from tcs.service.http.protocol import MOST_HEAD_BYTES, MOST_PIPELINED, BoundedProtocol
 from tests.placement.store.example import score_file
 
 TOKEN = "a-token-of-24-characters"
@@ -99,6 +99,138 @@ def test_headers_without_an_end_are_refused(server):
             # One connection may send any number of requests below the limit.
             whole.sendall(b"GET /v1 HTTP/1.1\r\nHost: 127.0.0.1\r\n" + 40 * line + b"\r\n")
             assert b"200 OK" in whole.recv(65536)
+
+
+def connected(server, timeout: float = 20.0) -> socket.socket:
+    """Return a connection to a server."""
+    address = httpx.URL(server.url)
+    end = time.monotonic() + timeout
+    while True:
+        try:
+            return socket.create_connection((address.host, address.port), timeout=timeout)
+        except ConnectionRefusedError:
+            # The thread of the server does not listen yet.
+            assert time.monotonic() < end
+            time.sleep(0.01)
+
+
+def received(connection: socket.socket) -> bytes:
+    """Return what arrives until the connection is closed."""
+    parts = []
+    try:
+        while part := connection.recv(65536):
+            parts.append(part)
+    except ConnectionError:
+        pass
+    return b"".join(parts)
+
+
+CHUNKED = (
+    b"POST /v1/select HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
+    b"Transfer-Encoding: chunked\r\n\r\n2\r\n{}\r\n"
+)
+
+
+@pytest.mark.parametrize(
+    "part",
+    [b"X-More: " + b"x" * 1000 + b"\r\n", b"1;" + b"x" * 1000 + b"\r\n \r\n"],
+    ids=["trailers", "extensions of chunks"],
+)
+def test_what_follows_or_divides_the_content_is_limited(server, part):
+    first = b"0\r\n" if part.startswith(b"X") else b""
+    with connected(server) as endless:
+        endless.sendall(CHUNKED + first)
+        with pytest.raises(ConnectionError):
+            endless.sendall(part * (100 * MOST_HEAD_BYTES // len(part)))
+
+
+def test_trailers_are_no_headers(server):
+    with connected(server) as whole:
+        # Otherwise what is checked before the content arrives could be changed after it.
+        whole.sendall(CHUNKED + b"0\r\nHost: evil.example\r\n\r\n")
+        assert b" 422 " in whole.recv(4096).splitlines()[0]
+
+
+def test_a_refusal_closes_the_connection(server):
+    with connected(server) as foreign:
+        foreign.sendall(b"POST /v1/select HTTP/1.1\r\nHost: evil\r\nContent-Length: 9\r\n\r\n")
+        answer = received(foreign)
+    assert b" 403 " in answer.splitlines()[0]
+    assert b"connection: close" in answer
+
+
+def test_requests_that_wait_for_an_answer_are_limited(server):
+    one = b"GET /v1 HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
+    with connected(server) as some:
+        some.sendall(MOST_PIPELINED * one)
+        time.sleep(0.05)
+        some.sendall(one[:-2] + b"Connection: close\r\n\r\n")
+        assert received(some).count(b"200 OK") == MOST_PIPELINED + 1
+    with connected(server) as many:
+        many.sendall(10 * MOST_PIPELINED * one)
+        assert b"Too many requests" in received(many)
+
+
+def test_connections_that_send_nothing_keep_nobody_out(engine, monkeypatch):
+    monkeypatch.setattr(protocol, "MOST_CONNECTIONS", 8)
+    half = (b"", b"GET /v1 HTTP", CHUNKED)
+    access = Access(token=TOKEN)
+    with Server(make_application(engine, access), host="127.0.0.1", port=0) as server:
+        idle = []
+        for i in range(24):
+            idle.append(connected(server))
+            idle[-1].sendall(half[i % 3])
+        with Client(server.url, token=TOKEN) as client:
+            assert client.catalogue()
+        # The first have been closed, the last have not; what lacks the token is answered at once.
+        assert received(idle[0]) == received(idle[1]) == b""
+        assert b" 401 " in received(idle[23])
+        for one in idle:
+            one.close()
+
+
+def test_half_a_head_is_not_waited_for(engine, monkeypatch):
+    monkeypatch.setattr(protocol, "HEAD_SECONDS", 0.2)
+    monkeypatch.setattr("tcs.service.http.server._KEEP_ALIVE", 0.2)
+    with Server(make_application(engine, Access()), host="127.0.0.1", port=0) as server:
+        for begun in (b"", b"GET /v1 HTTP/1.1\r\nHost: 127.0.0.1\r\n"):
+            with connected(server) as half:
+                half.sendall(begun)
+                assert received(half) == b""
+            with connected(server) as second:
+                second.sendall(b"GET /v1 HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n" + begun)
+                assert b"200 OK" in received(second)
+
+
+def test_contents_that_do_not_arrive_take_no_place(engine, monkeypatch):
+    monkeypatch.setattr(Engine, "limits", Limits(requests_at_once=1))
+    with Server(make_application(engine, Access()), host="127.0.0.1", port=0) as server:
+        with connected(server) as half, connected(server) as other:
+            half.sendall(CHUNKED)
+            other.sendall(CHUNKED)
+            time.sleep(0.05)
+            assert httpx.get(f"{server.url}/v1", trust_env=False).status_code == 200
+
+
+def test_an_aborted_upload_is_no_defect(server, caplog):
+    with connected(server) as aborted:
+        aborted.sendall(b"POST /v1/files HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 9\r\n\r\nx")
+        time.sleep(0.05)
+    httpx.get(f"{server.url}/v1", trust_env=False)
+    time.sleep(0.05)
+    assert caplog.records == []
+
+
+def test_contents_are_limited_together(engine, monkeypatch):
+    monkeypatch.setattr(Engine, "limits", Limits(request_bytes=1000, content_bytes=5000))
+    large = b"POST /v1/files HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 9000\r\n\r\n"
+    with Server(make_application(engine, Access()), host="127.0.0.1", port=0) as server:
+        with connected(server) as first, connected(server) as second:
+            first.sendall(large + b"x" * 4000)
+            time.sleep(0.05)
+            second.sendall(large + b"x" * 4000)
+            assert b" 503 " in received(second).splitlines()[0]
+            assert httpx.get(f"{server.url}/v1", trust_env=False).status_code == 200
 
 
 def burn(seconds: float) -> None:

@@ -28,6 +28,10 @@ ROUNDING = 1e-9
 """Added to footprints [m], so that rounding does not decide whether a touched edge is forbidden."""
 
 
+_PAIRS = 2**16
+"""Pairs of base pose and edge that are compared at once: some megabytes."""
+
+
 @dataclass(frozen=True, slots=True)
 class Region:
     """A polygon on the floor, its edge included, in the environment frame W."""
@@ -153,20 +157,41 @@ class Footprint:
             region: The region.
             base: x, y [m] and heading [rad] of the base in W, shape (n, 3).
         """
+        vertex = np.array(region.vertices)
+        widest = np.maximum(np.abs(self.low), np.abs(self.high))
+        reach = float(np.hypot(*widest)) + self.radius + ROUNDING
+        low, high = vertex.min(axis=0) - reach, vertex.max(axis=0) + reach
+        found = np.zeros(len(base), dtype=np.bool_)
+        near = np.flatnonzero(np.all((base[:, :2] >= low) & (base[:, :2] <= high), axis=1))
+        # So many at a time that the memory does not depend on their number.
+        step = max(_PAIRS // len(vertex), 1)
+        for rows in (near[i : i + step] for i in range(0, len(near), step)):
+            found[rows] = self._touches(vertex, base[rows])
+        return found
+
+    def _touches(self, vertex: FloatArray, base: FloatArray) -> BoolArray:
+        """Return whether a polygon with vertices (k, 2) in W meets the footprint, shape (n,)."""
         low, high = np.array(self.low), np.array(self.high)
-        corner = np.array(region.vertices)[None] - base[:, None, :2]
+        corner = vertex[None] - base[:, None, :2]
         cos, sin = np.cos(base[:, 2:]), np.sin(base[:, 2:])
-        x = cos * corner[..., 0] + sin * corner[..., 1]
-        y = cos * corner[..., 1] - sin * corner[..., 0]
-        # Vertices in the frame of the rectangle's middle, with a third coordinate of zero.
-        middle = (low + high) / 2.0
-        at = np.stack([x - middle[0], y - middle[1], np.zeros_like(x)], axis=-1)
-        following = np.roll(at, -1, axis=1)
-        half = np.append((high - low) / 2.0, 1.0)
-        distance = segment_distance(half, at.reshape(-1, 3), following.reshape(-1, 3))
-        close = distance.reshape(x.shape) <= self.radius + ROUNDING
+        # Vertices in the frame of the rectangle's middle.
+        middle, half = (low + high) / 2.0, (high - low) / 2.0
+        x = cos * corner[..., 0] + sin * corner[..., 1] - middle[0]
+        y = cos * corner[..., 1] - sin * corner[..., 0] - middle[1]
+        next_x, next_y = np.roll(x, -1, axis=1), np.roll(y, -1, axis=1)
+        gap = _least_gap(half, x, y, next_x, next_y)
+        # Edges that no axis separates cross the rectangle; of a few only the distance decides.
+        close = gap <= 0.0
+        pose, edge = np.nonzero((gap > 0.0) & (gap <= self.radius + ROUNDING))
+        if len(pose):
+            ends = (
+                np.stack([x[pose, edge], y[pose, edge], np.zeros(len(pose))], axis=1),
+                np.stack([next_x[pose, edge], next_y[pose, edge], np.zeros(len(pose))], axis=1),
+            )
+            distance = segment_distance(np.append(half, 1.0), *ends)
+            close[pose, edge] = distance <= self.radius + ROUNDING
         # A rectangle that no edge meets is inside or outside as a whole.
-        return np.asarray(np.any(close, axis=1) | _surrounded(at, following))
+        return np.asarray(np.any(close, axis=1) | _surrounded(x, y, next_x, next_y))
 
     def to_json(self) -> dict[str, Any]:
         """Return the footprint as plain containers [m]."""
@@ -179,14 +204,38 @@ class Footprint:
         }
 
 
-def _surrounded(vertex: FloatArray, following: FloatArray) -> BoolArray:
-    """Return whether polygons with these edges (n, k, 3) wind around the origin, shape (n,).
+def _least_gap(
+    half: FloatArray, x: FloatArray, y: FloatArray, next_x: FloatArray, next_y: FloatArray
+) -> FloatArray:
+    """Return a lower bound of the distance of edges from a rectangle [m], shape (n, k).
+
+    It is the greatest gap along three axes, the sides of the rectangle and the normal of the edge;
+    where it is not positive, they meet.
+
+    Args:
+        half: Half sizes of the rectangle, which is centred at the origin [m], shape (2,).
+        x: x of the first ends of the edges [m], shape (n, k).
+        y: y of the first ends.
+        next_x: x of the second ends.
+        next_y: y of the second ends.
+    """
+    gap = np.maximum(np.minimum(x, next_x), -np.maximum(x, next_x)) - half[0]
+    np.maximum(gap, np.maximum(np.minimum(y, next_y), -np.maximum(y, next_y)) - half[1], out=gap)
+    dx, dy = next_x - x, next_y - y
+    beyond = np.abs(x * next_y - y * next_x) - (np.abs(dy) * half[0] + np.abs(dx) * half[1])
+    length = np.hypot(dx, dy)
+    normal = np.divide(beyond, length, out=np.full_like(gap, -np.inf), where=length > 0.0)
+    return np.asarray(np.maximum(gap, normal))
+
+
+def _surrounded(x: FloatArray, y: FloatArray, next_x: FloatArray, next_y: FloatArray) -> BoolArray:
+    """Return whether polygons with these edges (n, k) wind around the origin, shape (n,).
 
     Where a polygon crosses itself, both windings count as inside.
     """
-    upward = (vertex[..., 1] <= 0.0) & (following[..., 1] > 0.0)
-    downward = (vertex[..., 1] > 0.0) & (following[..., 1] <= 0.0)
-    side = vertex[..., 0] * following[..., 1] - vertex[..., 1] * following[..., 0]
+    upward = (y <= 0.0) & (next_y > 0.0)
+    downward = (y > 0.0) & (next_y <= 0.0)
+    side = x * next_y - y * next_x
     winding = np.sum(upward & (side > 0.0), axis=1) - np.sum(downward & (side < 0.0), axis=1)
     return np.asarray(winding != 0)
 

@@ -39,12 +39,12 @@ class Access:
     from elsewhere that resolves its own name to this machine is refused."""
 
 
-class TooLargeError(Exception):
-    """A request with more bytes than are accepted."""
+class _RefusedError(Exception):
+    """A request whose content is not accepted: the response, or None where nobody waits for it."""
 
-
-class TooSlowError(Exception):
-    """A request whose content takes too long to arrive."""
+    def __init__(self, response: Any = None) -> None:
+        super().__init__()
+        self.response = response
 
 
 class Guard:
@@ -54,21 +54,79 @@ class Guard:
         """Guard an application."""
         self._application, self._access, self._limits = application, access, limits
         self._at_once = 0
+        self._bytes = 0
+        """Bytes of the content of all requests that arrive or are answered."""
 
     async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
         """Answer a request, or pass it on."""
         if scope["type"] != "http":
             await self._application(scope, receive, send)
             return
-        refusal = self._refusal(scope)
-        if refusal is not None:
-            await refusal(scope, receive, send)
-            return
-        self._at_once += 1
+        size = 0
+
+        def counted(more: int) -> int:
+            nonlocal size
+            size += more
+            self._bytes += more
+            return size
+
         try:
-            await self._answer(scope, receive, send)
+            refusal = self._refusal(scope)
+            if refusal is not None:
+                raise _RefusedError(refusal)
+            content = await self._content(scope, receive, counted)
+            # A request that has not arrived takes no place from those that have.
+            if self._at_once >= self._limits.requests_at_once:
+                text = f"{self._at_once} requests are being answered, the most at once. Try again."
+                raise _RefusedError(problem(BUSY, "BusyError", text))
+            self._at_once += 1
+            try:
+                await self._answer(scope, _again(content, receive), send)
+            finally:
+                self._at_once -= 1
+        except _RefusedError as refused:
+            if refused.response is not None:
+                # What else the client may send is not read.
+                refused.response.headers["connection"] = "close"
+                await refused.response(scope, receive, send)
         finally:
-            self._at_once -= 1
+            self._bytes -= size
+
+    async def _content(
+        self, scope: Message, receive: Receive, counted: Callable[[int], int]
+    ) -> bytes:
+        """Return the content of a request.
+
+        Args:
+            scope: The request.
+            receive: Returns the next part.
+            counted: Adds a number of bytes to those of the request, and returns the sum.
+
+        Raises:
+            _RefusedError: If it is too large or too slow, or the client is gone.
+        """
+        limits = self._limits
+        most = limits.file_bytes if scope["path"] == "/v1/files" else limits.request_bytes
+        content = bytearray()
+        try:
+            async with asyncio.timeout(limits.request_seconds):
+                while True:
+                    message = await receive()
+                    if message["type"] != "http.request":
+                        raise _RefusedError
+                    content += message.get("body", b"")
+                    if counted(len(message.get("body", b""))) > most:
+                        text = f"the request has more than {most:,} bytes, the limit."
+                        raise _RefusedError(problem(413, "TooLarge", text))
+                    # Large contents that fill the memory keep no small one out.
+                    if len(content) > limits.request_bytes and self._bytes > limits.content_bytes:
+                        text = "the contents of all requests fill the memory for them. Try again."
+                        raise _RefusedError(problem(BUSY, "BusyError", text))
+                    if not message.get("more_body", False):
+                        return bytes(content)
+        except TimeoutError:
+            text = f"the content of the request took longer than {limits.request_seconds:g} s."
+            raise _RefusedError(problem(408, "TooSlow", text)) from None
 
     async def _answer(self, scope: Message, receive: Receive, send: Send) -> None:
         begun = False
@@ -84,11 +142,7 @@ class Guard:
             await send(message)
 
         try:
-            await self._application(scope, _bounded(receive, self._limits, scope), send_guarded)
-        except TooLargeError as error:
-            await problem(413, "TooLarge", str(error))(scope, receive, send)
-        except TooSlowError as error:
-            await problem(408, "TooSlow", str(error))(scope, receive, send)
+            await self._application(scope, receive, send_guarded)
         except Exception:
             _LOG.exception("%s %s failed", scope["method"], scope["path"])
             if begun:
@@ -111,9 +165,6 @@ class Guard:
         if self._access.token is not None and not self._has_token(headers):
             text = "the request lacks the token: Authorization: Bearer TOKEN."
             return problem(401, "Unauthorized", text)
-        if self._at_once >= self._limits.requests_at_once:
-            text = f"{self._at_once} requests are being answered, the most at once. Try again."
-            return problem(BUSY, "BusyError", text)
         return None
 
     def _has_token(self, headers: dict[bytes, str]) -> bool:
@@ -140,29 +191,16 @@ def _name_of(host: str) -> str:
     return (name if colon and port.isdecimal() else host).lower()
 
 
-def _bounded(receive: Receive, limits: Limits, scope: Message) -> Receive:
-    """Return `receive` with bounds on the number of bytes and on the time they take."""
-    most = limits.file_bytes if scope["path"] == "/v1/files" else limits.request_bytes
-    loop = asyncio.get_running_loop()
-    end = loop.time() + limits.request_seconds
-    size, is_complete = 0, False
+def _again(content: bytes, receive: Receive) -> Receive:
+    """Return a function that returns the whole content of a request, and then the rest."""
+    is_first = True
 
-    async def receive_bounded() -> Message:
-        nonlocal size, is_complete
-        if is_complete:
-            # Only the end of the connection may follow, at any time.
-            return await receive()
-        try:
-            async with asyncio.timeout_at(end):
-                message = await receive()
-        except TimeoutError:
-            text = f"the content of the request took longer than {limits.request_seconds:g} s."
-            raise TooSlowError(text) from None
-        if message["type"] == "http.request":
-            size += len(message.get("body", b""))
-            is_complete = not message.get("more_body", False)
-            if size > most:
-                raise TooLargeError(f"the request has more than {most:,} bytes, the limit.")
-        return message
+    async def received() -> Message:
+        nonlocal is_first
+        if is_first:
+            is_first = False
+            return {"type": "http.request", "body": content, "more_body": False}
+        # Only the end of the connection may follow, at any time.
+        return await receive()
 
-    return receive_bounded
+    return received

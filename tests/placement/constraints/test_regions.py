@@ -1,10 +1,13 @@
+import tracemalloc
+
 import numpy as np
 import pytest
 from scipy.optimize import linprog
 
 from tcs.errors import SelectionError
 from tcs.placement.constraints import Obstacle, Region
-from tcs.placement.constraints.regions import RADIUS, Footprint
+from tcs.placement.constraints.contact import segment_distance
+from tcs.placement.constraints.regions import MAX_VERTICES, RADIUS, Footprint
 
 RECTANGLE = Footprint((-0.2, -0.3), (0.4, 0.3), 0.0)
 
@@ -52,6 +55,48 @@ def test_a_base_stands_on_a_region_if_they_have_a_point_in_common():
 )
 def test_regions_of_other_forms(polygon, expected):
     assert RECTANGLE.overlaps(Region.parse(polygon), np.zeros((1, 3))).tolist() == [expected]
+
+
+@pytest.mark.parametrize("footprint", [RECTANGLE, Footprint.of(None)], ids=["box", "circle"])
+def test_the_answer_is_that_of_the_distance_from_each_edge(footprint):
+    rng = np.random.default_rng(5)
+    base = np.column_stack([rng.uniform(-2, 2, (60, 2)), rng.uniform(-4, 4, 60)])
+    low, high = np.array(footprint.low), np.array(footprint.high)
+    found = []
+    for polygon in rng.uniform(-1, 1, (8, 5, 2)):
+        stands = footprint.overlaps(Region(tuple(map(tuple, polygon))), base)
+        for (x, y, yaw), answer in zip(base, stands, strict=True):
+            R = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
+            ends = np.pad((polygon - (x, y)) @ R.T - (low + high) / 2, ((0, 0), (0, 1)))
+            distance = segment_distance(
+                np.append((high - low) / 2, 1.0), ends, np.roll(ends, -1, axis=0)
+            )
+            # A footprint that no edge meets is on the region or beside it as a whole.
+            winding = np.unwrap(np.arctan2(*np.vstack([ends, ends[:1]])[:, 1::-1].T))
+            inside = round((winding[-1] - winding[0]) / (2 * np.pi)) != 0
+            assert answer == (distance.min() <= footprint.radius or inside)
+            found.append(answer)
+    assert 0.05 < np.mean(found) < 0.9
+
+
+def test_the_memory_of_a_region_does_not_depend_on_the_base_poses():
+    angle = np.linspace(0.0, 2.0 * np.pi, MAX_VERTICES, endpoint=False)
+    # Its edges cross the whole floor, so that no bounding box rejects them.
+    star = Region(tuple(zip(3 * np.cos(499 * angle), 3 * np.sin(499 * angle), strict=True)))
+    peaks = []
+    for count in (200, 800):
+        base = np.random.default_rng(1).uniform(-3, 3, (count, 3))
+        tracemalloc.start()
+        RECTANGLE.overlaps(star, base)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 1.2 * peaks[0] < 30e6
+
+
+def test_base_poses_far_from_a_region_are_not_compared_with_its_edges(monkeypatch):
+    monkeypatch.setattr(Footprint, "_touches", None)
+    far = np.random.default_rng(1).uniform(5, 9, (100, 3))
+    assert not RECTANGLE.overlaps(Region.parse("0 0, 1 0, 1 1"), far).any()
 
 
 def test_a_circle_keeps_its_radius():
