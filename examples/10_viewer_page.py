@@ -19,7 +19,7 @@ def main(folder: Path = Path("out/examples")) -> None:
     # The scene is rebuilt from the models of the file; their digest must be the stored one.
     job, scene, _ = rebuild_scene(file)
     # Without an observed state, table 0 is the only one.
-    viewed = ViewedSet.of(file, 0, file.nominal.sets.best)
+    viewed = ViewedSet.of(file, 0, tcs.select(file).indices)
     objects = SceneObjects(scene, job.task, viewed, meshes=False)
     text = export_page(open_meshcat(), objects, viewed, title="Feeding in the wheelchair, PR2")
     path = folder / "feeding.html"

@@ -150,7 +150,7 @@ def score_file(row: tuple[str, str], options: argparse.Namespace) -> ScoreFile:
 def from_behind(files: dict[tuple[str, str], ScoreFile]) -> GalleryPicture:
     """Return the paper's Figure 1: shaving in a bed without a wall, from one place."""
     free, walled = files["shaving", "bed-no-wall"], files["shaving", "bed"]
-    shown = ShownSet.of(free, None, max_members=1)
+    shown = ShownSet.best_of(free, single=True)
     alone = free.nominal.sets.scores_of(shown.indices)
     behind = walled.nominal.sets.scores_of(walled.nominal.sets.best_single)
     at = shown.members[0]
@@ -176,7 +176,7 @@ def from_behind(files: dict[tuple[str, str], ScoreFile]) -> GalleryPicture:
 
 def scene_of(row: tuple[str, str], file: ScoreFile) -> GalleryPicture:
     """Return a row of Figure 6: the robot at each base pose of the best set."""
-    shown = ShownSet.of(file, None)
+    shown = ShownSet.best_of(file)
     sets = file.nominal.sets
     reachability, manipulability = sets.scores_of(tuple(sorted(shown.indices)))
     title = row[0].replace("_", " ").capitalize()
@@ -222,7 +222,7 @@ def maps(files: dict[tuple[str, str], ScoreFile]) -> list[GalleryPicture]:
         ),
         GalleryPicture(
             "states",
-            states_figure(bed, ShownSet.of(bed, None)),
+            states_figure(bed, ShownSet.best_of(bed)),
             _MAP_DPI,
             "For each state of the bed",
             "Bathing, drawn by `tcs map bathing-bed-pr2.tcs --states --out states.png`: bed height "
@@ -237,7 +237,7 @@ def maps(files: dict[tuple[str, str], ScoreFile]) -> list[GalleryPicture]:
 
 
 def _share_a_state(file: ScoreFile) -> bool:
-    return len({at.environment for at in ShownSet.of(file, None).members}) == 1
+    return len({at.environment for at in ShownSet.best_of(file).members}) == 1
 
 
 def write(path: Path, content: bytes) -> None:

@@ -24,7 +24,7 @@ def plan(
             metavar="X Y YAW_DEG",
             help="Plan for the set selected from this base pose in the environment frame "
             "(m, m, deg).",
-            show_default="the set with the best scores",
+            show_default="the recommended set, wherever the robot is",
         ),
     ] = None,
     exactly: Annotated[

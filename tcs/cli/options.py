@@ -282,15 +282,23 @@ class TopOptions:
         ),
     ] = 0.5
     place_penalty: Annotated[
-        float,
-        typer.Option(help="Fraction of the score that each further base pose costs."),
-    ] = 0.01
+        float | None,
+        typer.Option(
+            help="Fraction of the score that each further base pose costs.", show_default="0.01"
+        ),
+    ] = None
     environment_penalty: Annotated[
-        float, typer.Option(help="What moving the environment from its setting (--at) costs.")
-    ] = 0.01
+        float | None,
+        typer.Option(
+            help="What moving the environment from its setting (--at) costs.", show_default="0.01"
+        ),
+    ] = None
     preference_penalty: Annotated[
-        float, typer.Option(help="What a set costs that violates a preference (--prefer).")
-    ] = 0.05
+        float | None,
+        typer.Option(
+            help="What a set costs that violates a preference (--prefer).", show_default="0.05"
+        ),
+    ] = None
 
     def sets(self) -> Top | None:
         """Return the number of sets and their differences; None for the best set alone.
@@ -312,7 +320,7 @@ class ShownOptions:
         typer.Option(
             metavar="X Y YAW_DEG",
             help="Show the set selected from this base pose in the environment frame (m, m, deg).",
-            show_default="the set with the best scores",
+            show_default="the recommended set, wherever the robot is",
         ),
     ] = None
     torso: Torso = 0.0

@@ -48,7 +48,7 @@ def draw_map(
 ) -> None:
     """Draw the best score at each base position, from above, and the members of a set.
 
-    The picture shows the set selected from --here, or the set with the best scores.
+    The picture shows the set selected from --here, or the recommended one.
     """
     if score is not None and not states:
         raise typer.BadParameter(
@@ -81,7 +81,7 @@ def draw_picture(
 ) -> None:
     """Draw the robot at the base poses of a set, its arm at a goal, as collision shapes.
 
-    The picture shows the set selected from --here, or the set with the best scores.
+    The picture shows the set selected from --here, or the recommended one.
     """
 
     def figure(loaded: ScoreFile, shown: ShownSet) -> Figure:

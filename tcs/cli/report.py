@@ -40,7 +40,7 @@ def report(
 ) -> None:
     """Write a page about a score file: base poses, scores, reasons and verification.
 
-    The page shows the set selected from --here, or the set with the best scores. Answers are
+    The page shows the set selected from --here, or the recommended one. Answers are
     re-checked with Drake; if one is false, the page states it and the exit code is 1.
     """
     here = chosen.state()

@@ -23,10 +23,11 @@ _Errors = Annotated[
     ),
 ]
 Delta = Annotated[
-    float,
+    float | None,
     typer.Option(
         help="Weight of the success under error; above 0 only sets with an estimate by "
-        "`tcs robustify` can be selected."
+        "`tcs robustify` can be selected.",
+        show_default="0",
     ),
 ]
 BodyCollisions = Annotated[

@@ -18,6 +18,7 @@ from tcs.output.terminal import tables
 
 if TYPE_CHECKING:
     from tcs.kernel.arrays import FloatArray
+    from tcs.placement.selection import UtilityWeights
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,20 +48,22 @@ class _StartOptions:
         ),
     ] = None
 
-    def base(self) -> tuple[tuple[float, float, float], FloatArray | None]:
+    def base(self) -> tuple[tuple[float, float, float] | None, FloatArray | None]:
         """Return the base pose in m, m and deg, and its covariance in m and rad if it was located.
+
+        The base pose is None if it is not known.
 
         Raises:
             typer.BadParameter: If the options do not determine it.
             DataFileError: If the file cannot be used.
         """
-        if (self.here is None) == (self.located is None):
-            raise typer.BadParameter("give --here or --located.", param_hint="--here")
-        if self.here is not None:
+        if self.here is not None and self.located is not None:
+            raise typer.BadParameter("give --here or --located, not both.", param_hint="--here")
+        if self.located is None:
             if self.task_at is not None:
                 raise typer.BadParameter("requires --located.", param_hint="--task-at")
             return self.here, None
-        if self.located is None or self.task_at is None:
+        if self.task_at is None:
             raise typer.BadParameter("requires --task-at.", param_hint="--located")
         from tcs.cli.locate import pose_of
         from tcs.perception import load_located
@@ -76,10 +79,16 @@ def select(
     start: _StartOptions,
     torso: options.Torso = 0.0,
     at: options.At = None,
-    alpha: Annotated[float, typer.Option(help="Weight of the goals reached, P_R.")] = 1.0,
-    beta: Annotated[float, typer.Option(help="Weight of the manipulability, P_M.")] = 1.0,
-    gamma: Annotated[float, typer.Option(help="Weight of the travel cost.")] = 0.05,
-    delta: robustness.Delta = 0.0,
+    alpha: Annotated[
+        float | None, typer.Option(help="Weight of the goals reached, P_R.", show_default="1")
+    ] = None,
+    beta: Annotated[
+        float | None, typer.Option(help="Weight of the manipulability, P_M.", show_default="1")
+    ] = None,
+    gamma: Annotated[
+        float | None, typer.Option(help="Weight of the travel cost.", show_default="0.05")
+    ] = None,
+    delta: robustness.Delta = None,
     costs: options.TravelCosts,
     wanted: options.ConstraintOptions,
     offered: options.TopOptions,
@@ -102,7 +111,12 @@ def select(
     ] = False,
     as_json: options.Json = False,
 ) -> None:
-    """Select the set with the greatest utility from the current state."""
+    """Select the recommended set; with weights, that of the greatest utility from --here.
+
+    Recommended is the most robust set where `tcs robustify` estimated the success under error; else
+    the set of the greatest utility; and without --here, the one that reaches most goals with the
+    fewest stops. Each weight or penalty that is given makes the utility decide.
+    """
     import tcs
     from tcs.cli.values import current_state, frame_values, observed_settings
     from tcs.output.words import choice_in_words
@@ -111,12 +125,14 @@ def select(
     from tcs.placement.store import motions_of
 
     base, covariance = start.base()
+    if base is None and (torso or at):
+        raise typer.BadParameter("--torso and --at require --here.", param_hint="--here")
     loaded = tcs.load(file)
-    here = current_state(base, torso, at or ())
+    here = None if base is None else current_state(base, torso, at or ())
     choose = partial(
         tcs.select,
         loaded,
-        weights=tcs.UtilityWeights(
+        weights=_weights(
             reachability=alpha,
             manipulability=beta,
             travel=gamma,
@@ -140,7 +156,7 @@ def select(
     if motions is not None:
         compared = Executability.of(loaded, motions, choice, choose(here))
         result["executable"] = compared.to_json(choice)
-    if covariance is not None:
+    if covariance is not None and base is not None and here is not None:
         x, y, yaw_deg = base
         result["located"] = {
             "here": {"x": x, "y": y, "yaw_deg": yaw_deg},
@@ -149,6 +165,18 @@ def select(
         }
     result |= scored_entries(loaded)
     terminal.print_result(result, tables.report_choice, as_json=as_json)
+
+
+def _weights(**given: float | None) -> UtilityWeights | None:
+    """Return the weights that were given, the others at their defaults; None without any.
+
+    Raises:
+        SelectionError: If a weight is out of range.
+    """
+    from tcs.placement.selection import UtilityWeights
+
+    stated = {name: value for name, value in given.items() if value is not None}
+    return UtilityWeights(**stated) if stated else None
 
 
 @expand_options
@@ -160,7 +188,7 @@ def explain(
         int | None,
         typer.Option(
             help="Number of a configuration, as in `tcs export`.",
-            show_default="the best member of the best set",
+            show_default="the best member of the recommended set",
         ),
     ] = None,
     here: Annotated[

@@ -25,6 +25,11 @@ KEPT_WEIGHTS = 64
 """Most weights that are kept: checking them takes as long as a tenth of a selection."""
 _travel = lru_cache(KEPT_WEIGHTS)(TravelWeights)
 _utility = lru_cache(KEPT_WEIGHTS)(UtilityWeights)
+_WEIGHTS = {
+    *("alpha", "beta", "gamma", "delta"),
+    *("place_penalty", "environment_penalty", "preference_penalty"),
+}
+"""Fields of a selection that make the utility decide."""
 
 
 def settings_of(values: Mapping[str, float], where: str) -> dict[str, float]:
@@ -151,12 +156,14 @@ def travel_of(request: TravelCosts) -> TravelWeights:
     )
 
 
-def utility_of(request: SelectRequest) -> UtilityWeights:
-    """Return the weights of the utility.
+def utility_of(request: SelectRequest) -> UtilityWeights | None:
+    """Return the weights of the utility; None if the request states none.
 
     Raises:
         SelectionError: If a weight is invalid.
     """
+    if not request.model_fields_set & _WEIGHTS:
+        return None
     return _utility(
         reachability=request.alpha,
         manipulability=request.beta,

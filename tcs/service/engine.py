@@ -193,16 +193,21 @@ class Engine:
         return self._views.page(file, "report")
 
     def select(self, request: SelectRequest) -> dict[str, Any]:
-        """Return the set with the greatest utility, as `tcs select --json`.
+        """Return the recommended set, or that of greatest utility, as `tcs select --json`.
 
         Raises:
             NotFoundError: If the score file is not held.
+            ServiceError: If torso or settings are given without the base pose.
             TcsError: As `tcs.select`.
         """
         with self._files.held(request.file).lock:
             file = self._files.loaded(request.file)
             motions = self._files.motions(request.file) if request.executable else None
-            here = state_of(request.here, request.torso, request.at)
+            if request.here is None and (request.torso or request.at):
+                raise ServiceError("'torso' and 'at' require 'here'.")
+            here = None
+            if request.here is not None:
+                here = state_of(request.here, request.torso, request.at)
             choose = partial(
                 select,
                 file,

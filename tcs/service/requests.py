@@ -62,11 +62,13 @@ class TravelCosts(Document):
 
 
 class SelectRequest(TravelCosts, Limited, Observed, State):
-    """Select the set with the greatest utility, as `tcs select`."""
+    """Select the recommended set, or with weights that of greatest utility, as `tcs select`."""
 
     file: FileId
-    here: BasePose
+    here: BasePose | None = None
+    """Current base pose; without it travel costs nothing."""
     alpha: Number = 1.0
+    """This and the weights and penalties below: the utility decides if one is given."""
     beta: Number = 1.0
     gamma: Number = 0.05
     delta: Number = 0.0

@@ -353,8 +353,10 @@ def test_the_measure_is_passed_on_and_named(tcs_command, example, tmp_path, monk
 def test_score_as_text(tcs_command, tmp_path, stand_in):
     ran = tcs_command("score", "shaving", "--out", tmp_path / "o.tcs")
     assert ran.code == 0
-    for word in ("configurations", "best set", "best base pose", "base x [m]", "o.tcs"):
+    for word in ("configurations", "recommended (", "base x [m]", "o.tcs"):
         assert word in ran.out
+    # What to do next is said last.
+    assert ran.out.splitlines()[-1].startswith(f"next: tcs robustify {tmp_path / 'o.tcs'} ")
     # Neither constraints nor approaches were requested.
     assert "constraint" not in ran.out
     assert "approach" not in ran.out
@@ -366,7 +368,8 @@ def test_nothing_reached_is_an_answer(tcs_command, example, tmp_path, monkeypatc
     ran = tcs_command("score", "shaving", "--out", path)
     assert ran.code == 0
     assert "no configuration reaches a goal" in ran.out
-    assert tcs_command("score", "shaving", "--out", path, "--json").json["best"] is None
+    result = tcs_command("score", "shaving", "--out", path, "--json").json
+    assert (result["best"], result["recommended"]) == (None, None)
 
 
 @pytest.mark.parametrize("jobs", ["0", "-1", "two"])

@@ -26,7 +26,8 @@ def test_select_prints_the_choice(tcs_command, small_file):
     result = ran.json
     assert set(result) == {
         "members", "measure", "reachability", "manipulability", "cost", "utility", "seconds",
-        "unreachable", "net_utility", "moves", "configurations", "places", "here_place",
+        "unreachable", "net_utility", "moves", "configurations", "places", "here_place", "here",
+        "basis", "fewer", "gain",
     }  # fmt: skip
     choice = tcs.select(tcs.load(small_file), state())
     assert result["configurations"] == [choice.indices[i] for i in choice.order]
@@ -34,6 +35,22 @@ def test_select_prints_the_choice(tcs_command, small_file):
     assert result["members"] == [choice.members[i].to_json() for i in choice.order]
     assert result["utility"] == choice.utility
     assert result["cost"] == choice.cost
+
+
+def test_without_here_the_recommended_set_is_selected(tcs_command, small_file):
+    result = tcs_command("select", small_file, "--json").json
+    file = tcs.load(small_file)
+    assert result["basis"] == "goals"
+    assert result["configurations"] == list(tcs.select(file).indices)
+    assert result["here"] is None
+    # One weight is a wish: then the utility decides, and travel costs nothing.
+    wished = tcs_command("select", small_file, "--gamma", 5, "--json").json
+    assert wished["basis"] == "utility"
+    choice = tcs.select(file, state(), weights=tcs.UtilityWeights(travel=0.0, environment=0.0))
+    assert wished["utility"] == choice.utility
+    text = tcs_command("select", small_file).out
+    assert "most goals, then fewest stops: " in text
+    assert "travel cost" not in text
 
 
 def test_members_come_in_the_order_of_the_tour(tcs_command, small_file):
@@ -77,7 +94,7 @@ def test_select_as_text(tcs_command, small_file):
 @pytest.mark.parametrize(
     "words",
     [
-        pytest.param((), id="no place"),
+        pytest.param(("--at", "bed_height=0"), id="no place"),
         pytest.param(("--here", "1", "2"), id="half a place"),
         pytest.param(("--here", "1", "2", "north"), id="no number"),
         pytest.param((*HERE, "--max-members", "4"), id="four members"),

@@ -81,7 +81,7 @@ def _print_explained(out: Console, result: Mapping[str, Any]) -> None:
     reaching = result["best_set"]["reaching"]
     if reaching:
         members = " and ".join(str(h) for h in reaching)
-        out.print(f"The best set reaches it from configuration {members}.")
+        out.print(f"The recommended set reaches it from configuration {members}.")
     _print_refined(out, result)
 
 
@@ -91,10 +91,10 @@ def _print_refined(out: Console, result: Mapping[str, Any]) -> None:
     if refined is None:
         return
     if not refined["reaching"]:
-        out.print("The best refined set, between the grid points, does not reach it.")
+        out.print("The recommended set, refined between the grid points, does not reach it.")
         return
     members = " and ".join(member_text(refined["members"][i]) for i in refined["reaching"])
-    out.print(f"The best refined set, between the grid points, reaches it from {members}.")
+    out.print(f"The recommended set, refined between the grid points, reaches it from {members}.")
 
 
 def _print_fix(out: Console, result: Mapping[str, Any]) -> None:
@@ -105,7 +105,11 @@ def _print_fix(out: Console, result: Mapping[str, Any]) -> None:
         return
     if fix["configuration"] == explained["configuration"] and not fix["changes"]:
         return
-    out.print(f"The nearest configuration that reaches it is {fix['configuration']}:")
+    lost, names = fix["lost_goals"], result["goal_names"]
+    also = " and loses no other goal"
+    if lost:
+        also = f" and loses fewest others ({len(lost)})"
+    out.print(f"The nearest configuration that reaches it{also} is {fix['configuration']}:")
     out.print(f"  {fix['sentence']}")
     if fix["place"]:
         out.print(f"  {fix['place']}")
@@ -114,7 +118,6 @@ def _print_fix(out: Console, result: Mapping[str, Any]) -> None:
             [explained["members"][0], fix["members"][0]], "", ("explained", "nearest reaching")
         )
     )
-    lost, names = fix["lost_goals"], result["goal_names"]
     loses = f", and no longer {goal_list(lost, names)}" if lost else ""
     out.print(
         f"It reaches {goals_text(fix['reached_goals'], names)}{loses}; "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -17,6 +18,7 @@ from tcs.output.words import (
     axis_name,
     axis_title,
     axis_value,
+    basis_text,
     body_name,
     deviation_text,
     frame_name,
@@ -128,17 +130,29 @@ def report_scores(result: Mapping[str, Any]) -> None:
         fraction = percentage(count / result["pairs"])
         reasons.add_row(REASON_TEXTS[reason_of(name)], f"{count:,}", fraction)
     out.print(reasons)
-    for key, what in (("best_single", "best base pose"), ("best", "best set")):
-        best = result[key]
-        if best is None:
-            out.print(f"{what}: none, no configuration reaches a goal.")
-            continue
-        scores = scores_text(best["reachability"], best["manipulability"], result["measure"])
-        out.print(f"{what}: {scores}")
-        for line in stop_places(best.get("places", ())):
-            out.print(line)
-        out.print(members_table(best["members"]))
+    found = result["recommended"]
+    if found is None:
+        out.print("recommended: no set, no configuration reaches a goal.")
+        out.print(f"wrote {result['file']}")
+        return
+    scores = scores_text(found["reachability"], found["manipulability"], result["measure"])
+    out.print(f"recommended ({basis_text(found['basis'])}): {scores}")
+    for line in stop_places(found["places"]):
+        out.print(line)
+    out.print(members_table(found["members"]))
+    if "gain" in found:
+        out.print(found["gain"])
+        fewer = found["fewer"]
+        scores = scores_text(fewer["reachability"], fewer["manipulability"], result["measure"])
+        out.print(f"best with fewer stops: {scores}")
+        out.print(members_table(fewer["members"]))
     out.print(f"wrote {result['file']}")
+    if not result.get("hands"):
+        out.print(
+            f"next: tcs robustify {shlex.quote(result['file'])} estimates which set still does the "
+            "task when person and robot are not quite where they were scored.",
+            soft_wrap=True,
+        )
 
 
 def _approach_text(found: Mapping[str, Any]) -> str:
@@ -195,10 +209,15 @@ def report_choice(result: Mapping[str, Any]) -> None:
         out.print(line)
     out.print(members_table(result["members"]))
     scores = scores_text(result["reachability"], result["manipulability"], result["measure"])
+    travel = f", travel cost {result['cost']:.2f}"
+    if result["here"] is None:
+        travel = f", {result['cost']:.2f} between the stops" if len(result["members"]) > 1 else ""
     out.print(
-        f"{scores}, travel cost {result['cost']:.2f}, utility {result['utility']:.3f} "
+        f"{basis_text(result['basis'])}: {scores}{travel}, utility {result['utility']:.3f} "
         f"(selected in {1e3 * result['seconds']:.1f} ms)"
     )
+    if "gain" in result:
+        out.print(result["gain"])
     if "success" in result:
         low, high = result["success_ci95"]
         out.print(

@@ -6,7 +6,13 @@ for the command line, reports, the viewer and pictures. Nothing here draws, simu
 
 from __future__ import annotations
 
-from tcs.output.words.answers import choice_in_words, explanation_in_words, summary_in_words
+from tcs.output.words.answers import (
+    basis_text,
+    choice_in_words,
+    explanation_in_words,
+    gain_text,
+    summary_in_words,
+)
 from tcs.output.words.assignment import assign_goals, assigned_goals
 from tcs.output.words.bodies import body_name, frame_name, pair_text
 from tcs.output.words.configurations import (
@@ -67,6 +73,7 @@ __all__ = [
     "axis_unit",
     "axis_value",
     "base_pose_text",
+    "basis_text",
     "body_name",
     "choice_in_words",
     "colour_legend",
@@ -74,6 +81,7 @@ __all__ = [
     "explanation_in_words",
     "frame_name",
     "frames_of_state",
+    "gain_text",
     "goal_list",
     "goal_names",
     "goal_place",

@@ -13,7 +13,14 @@ from tcs.model.grid import InitialConfiguration
 from tcs.placement.reasons.distribution import Distribution
 from tcs.placement.reasons.explained import ExplainedConfiguration
 from tcs.placement.reasons.fix import Fix, fix_weights, nearest_fix
-from tcs.placement.selection import Match, TravelWeights, nearest_table, scores_at_limbs
+from tcs.placement.selection import (
+    Match,
+    SelectionTables,
+    TravelWeights,
+    nearest_table,
+    scores_at_limbs,
+    select,
+)
 from tcs.placement.store import ScoreFile, state_to_json
 from tcs.placement.tables import SetTable
 
@@ -31,11 +38,11 @@ class Explanation:
     explained: ExplainedConfiguration | None
     """The explained configuration; None if none was stated and no configuration reaches a goal."""
     best_set: tuple[int, ...]
-    """Flat indices of the members of the best set."""
+    """Flat indices of the members of the recommended set, on the grid."""
     best_reaching: tuple[int, ...]
     """Flat indices of those members that reach the goal."""
     refined: tuple[InitialConfiguration, ...]
-    """Members of the best refined set, between the grid points; empty in a file without any."""
+    """Members of the recommended set, if it is a refined one, between the grid points; else ()."""
     refined_reaching: tuple[int, ...]
     """Numbers of those that reach the goal, from 0."""
     distribution: Distribution
@@ -124,13 +131,13 @@ def explain(
         file: A loaded score file.
         goal: Number of the goal, from 0.
         configuration: Flat index of a configuration of the grid, or any configuration, of which the
-            nearest one of the grid is explained. None for the member of the best set with the
-            greatest P_R + P_M by itself.
+            nearest one of the grid is explained. None for the member of the recommended set with
+            the greatest P_R + P_M by itself.
         weights: Cost of each type of change; by default `fix_weights` of the grid.
         observed: Observed values of the file's observed axes [m or rad].
         frames: Instead of `observed`, positions of body frames in W [m], by name. With several,
             each goal also has to be reached in the table nearest to its own frame, as in
-            `tcs.select`; best set and base positions are those of the table nearest to all.
+            `tcs.select`; recommended set and base positions are those of the table nearest to all.
 
     Returns:
         The reason, the distribution of reasons over the grid, and the nearest configuration that
@@ -153,21 +160,22 @@ def explain(
         )
     grid, scores = file.configurations, scores_at_limbs(file, match)
     weights = fix_weights(grid) if weights is None else weights
-    requested = _best_member(table.sets) if configuration is None else configuration
+    best_set = _recommended(file, match.index)
+    requested = _best_member(table.sets, best_set) if configuration is None else configuration
     explained = None
     if requested is not None:
         explained = ExplainedConfiguration.of(grid, scores, goal, requested)
     fix, unreachable = None, 0
     if explained is not None:
         fix, unreachable = nearest_fix(grid, scores, table.sets.lattice, goal, explained, weights)
-    refined, refined_reaching = _best_refined(file, match.index, goal)
+    refined, refined_reaching = _recommended_refined(file, match.index, goal)
     return Explanation(
         file=file,
         goal=goal,
         match=match,
         explained=explained,
-        best_set=table.sets.best,
-        best_reaching=tuple(h for h in table.sets.best if scores.reached[h, goal]),
+        best_set=best_set,
+        best_reaching=tuple(h for h in best_set if scores.reached[h, goal]),
         refined=refined,
         refined_reaching=refined_reaching,
         distribution=Distribution.of(scores, goal),
@@ -177,21 +185,30 @@ def explain(
     )
 
 
-def _best_refined(
+def _recommended(file: ScoreFile, table: int) -> tuple[int, ...]:
+    """Return the flat indices of the recommended set of the grid; () if no goal is reached."""
+    tables = SelectionTables.of(file, table)
+    return select(tables, refined=False).indices if len(tables.sets.candidates) else ()
+
+
+def _recommended_refined(
     file: ScoreFile, table: int, goal: int
 ) -> tuple[tuple[InitialConfiguration, ...], tuple[int, ...]]:
-    """Return the best refined set of a table, and which of its members reach a goal."""
+    """Return the recommended set if it is a refined one, and its members that reach a goal."""
     refined = file.tables[table].refined
     if refined is None:
         return (), ()
-    members = refined.members(file.configurations, 0)
-    return members, tuple(i for i in range(len(members)) if refined.reached[0, i, goal])
+    row = select(SelectionTables.of(file, table)).refined
+    if row is None:
+        return (), ()
+    members = refined.members(file.configurations, row)
+    return members, tuple(i for i in range(len(members)) if refined.reached[row, i, goal])
 
 
-def _best_member(sets: SetTable) -> int | None:
-    """Return the member of the best set with the greatest P_R + P_M by itself."""
-    if not sets.best:
+def _best_member(sets: SetTable, members: tuple[int, ...]) -> int | None:
+    """Return the member of a set with the greatest P_R + P_M by itself; None without members."""
+    if not members:
         return None
-    rows = np.searchsorted(sets.candidates, sets.best)
+    rows = np.searchsorted(sets.candidates, members)
     scores = sets.single_reachability[rows] + sets.single_manipulability[rows]
-    return sets.best[int(np.argmax(scores))]
+    return members[int(np.argmax(scores))]

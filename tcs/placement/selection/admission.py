@@ -71,27 +71,35 @@ class Admitted:
 
 
 def admitted_candidates(
-    constraints: Constraints, here: InitialConfiguration, tables: SelectionTables
+    constraints: Constraints, here: InitialConfiguration | None, tables: SelectionTables
 ) -> Admitted:
     """Return the candidates that satisfy all constraints.
 
     Args:
         constraints: The constraints.
-        here: The current state, for `keep`.
+        here: The current state, for `keep`; None if it is not known.
         tables: The candidates.
 
     Raises:
         UnknownNameError: If the grid has no such axis.
         GridError: If a condition has another unit than its axis, or excludes all its values.
-        SelectionError: If the current state lacks an axis to keep or is beyond the scored values,
-            an obstacle is given and the robot's shapes are not known, or no candidate is left.
+        SelectionError: If the current state is not known or lacks an axis to keep, or is beyond
+            the scored values, an obstacle is given and the robot's shapes are not known, or no
+            candidate is left.
     """
     sets, grid = tables.sets, tables.grid
     remaining = np.ones(len(sets.candidates), dtype=np.bool_)
     reached, dexterity = sets.reached, sets.dexterity
     left: list[Left] = []
     warnings: list[str] = []
-    now = current_values(here, grid, ()) if constraints.keep else {}
+    now = {}
+    if constraints.keep:
+        if here is None:
+            raise SelectionError(
+                f"Keeping {', '.join(constraints.keep)} requires the current state. Give --here, "
+                "with --torso and --at."
+            )
+        now = current_values(here, grid, ())
     of_axes = list(axis_constraints(constraints, now, grid))
     along = grid.indices(sets.candidates) if of_axes else np.empty((0, 0), np.int64)
     for name, axis, admitted, warning in of_axes:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +43,22 @@ class Top:
             raise SelectionError(f"min_apart is {self.min_apart!r}; must be 0 to 40 m.")
 
 
+class Placed(NamedTuple):
+    """Where a set of m members is; on the grid or off it."""
+
+    bases: NDArray[np.float64]
+    """x and y of the base of each member in W [m], shape (m, 2)."""
+    states: IntArray
+    """Number of the state of the environment of each member, shape (m,); of a refined member that
+    of the configuration that it was refined from."""
+
+    @classmethod
+    def of_candidates(cls, sets: SetTable, rows: Sequence[int]) -> Placed:
+        """Return where a set of the grid is, given its candidate numbers."""
+        member = list(rows)
+        return cls(sets.cell_xy[sets.cell[member]], sets.state[member].astype(np.int64))
+
+
 @dataclass(frozen=True, eq=False)
 class Distinct:
     """Sets that were offered; others are distinct if they differ from each of them.
@@ -51,31 +69,54 @@ class Distinct:
 
     sets: SetTable
     min_apart: float
-    offered: tuple[tuple[int, ...], ...]
-    """Candidate numbers of the members of each."""
+    offered: tuple[Placed, ...]
 
     def of_sets(self, members: tuple[IntArray, ...]) -> BoolArray:
         """Return which sets are distinct, given their members of shapes (n,), shape (n,)."""
+        sets = self.sets
         distinct = np.ones(len(members[0]), dtype=np.bool_)
+        is_one_state = bool(sets.state.min() == sets.state.max())
         for other in self.offered:
-            distinct &= self._differ(members, np.array(other))
+            bits = self._bits(sets.cell_xy, other)[sets.cell]
+            states = [] if is_one_state else [sets.state[member] for member in members]
+            distinct &= _differ([bits[member] for member in members], states, other)
         return distinct
 
-    def _differ(self, members: tuple[IntArray, ...], other: IntArray) -> BoolArray:
-        """Return which sets differ from another set, shape (n,)."""
-        sets = self.sets
-        # Distance of every cell from each member of the other set, shape (N, m).
-        offset = sets.cell_xy[:, None] - sets.cell_xy[sets.cell[other]]
+    def admits(self, placed: Placed) -> bool:
+        """Return whether a set that need not be on the grid is distinct."""
+        return all(
+            _differ(
+                [bits[None] for bits in self._bits(placed.bases, other)],
+                [state[None] for state in placed.states],
+                other,
+            )[0]
+            for other in self.offered
+        )
+
+    def _bits(self, xy: NDArray[np.float64], other: Placed) -> NDArray[np.uint8]:
+        """Return from which members of another set positions (n, 2) are apart, shape (n,).
+
+        One bit for each member: there are millions of sets, and few positions.
+        """
+        offset = xy[:, None] - other.bases
         apart = np.hypot(offset[..., 0], offset[..., 1]) >= self.min_apart - 1e-9
-        # One bit for each member of the other set: there are millions of sets, and few cells.
-        bits = (apart << np.arange(other.size)).sum(axis=1).astype(np.uint8)[sets.cell]
-        of_members = [bits[member] for member in members]
-        differ = np.bitwise_and.reduce(of_members) != 0
-        for far in of_members:
-            differ |= far == (1 << other.size) - 1
-        if sets.state.min() == sets.state.max():
-            return np.asarray(differ)
-        state = np.stack([sets.state[member] for member in members])
-        same = state[:, :, None] == sets.state[other]
+        return np.asarray((apart << np.arange(len(other.bases))).sum(axis=1), dtype=np.uint8)
+
+
+def _differ(
+    bits: Sequence[NDArray[np.uint8]], states: Sequence[NDArray[Any]], other: Placed
+) -> BoolArray:
+    """Return which sets differ from another set, shape (n,).
+
+    Args:
+        bits: From which members of the other set each member is apart, shapes (n,).
+        states: State of the environment of each member, shapes (n,); [] if there is one state.
+        other: The other set.
+    """
+    differ = np.bitwise_and.reduce(list(bits)) != 0
+    for far in bits:
+        differ |= far == (1 << len(other.bases)) - 1
+    if len(states):
+        same = np.stack(list(states))[:, :, None] == other.states
         differ |= ~(np.all(np.any(same, axis=2), axis=0) & np.all(np.any(same, axis=0), axis=1))
-        return np.asarray(differ)
+    return np.asarray(differ)

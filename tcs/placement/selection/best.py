@@ -1,4 +1,4 @@
-"""Selection of the stored set with the greatest utility from the current state."""
+"""Selection of a stored set: the recommended one, or the one with the greatest utility."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +19,17 @@ from tcs.placement.selection.alternatives import Distinct, Top
 from tcs.placement.selection.bounds import Bounds
 from tcs.placement.selection.choice import Choice, SelectionTables, changed_axes
 from tcs.placement.selection.coverage import warning_outside
-from tcs.placement.selection.estimated import Candidates, best_estimated, check_estimated
+from tcs.placement.selection.estimated import (
+    Candidates,
+    best_estimated,
+    check_estimated,
+    none_estimated,
+)
 from tcs.placement.selection.executable import admitted_executable, motions_at
 from tcs.placement.selection.limbs import admitted_at_limbs
 from tcs.placement.selection.observed import Match, nearest_table
 from tcs.placement.selection.penalties import Penalties, penalties_of
+from tcs.placement.selection.ranking import Ranking, ranking_of
 from tcs.placement.selection.refined import RefinedQuery, grid_only
 from tcs.placement.selection.search import best_set
 from tcs.placement.selection.travel import Legs, TravelWeights, legs_from, shortest_tour
@@ -32,7 +38,6 @@ from tcs.placement.store import MotionFile, ScoreFile
 from tcs.placement.tables import tc_manipulability, tc_reachability
 from tcs.placement.tables.sets import MOST_MEMBERS
 
-_DEFAULT_WEIGHTS = UtilityWeights()
 _DEFAULT_TRAVEL = TravelWeights()
 _NO_CONSTRAINTS = Constraints()
 MOST_CHOSEN = 1000
@@ -41,9 +46,9 @@ MOST_CHOSEN = 1000
 
 def select(
     scores: ScoreFile | SelectionTables,
-    here: InitialConfiguration,
+    here: InitialConfiguration | None = None,
     *,
-    weights: UtilityWeights = _DEFAULT_WEIGHTS,
+    weights: UtilityWeights | None = None,
     travel: TravelWeights = _DEFAULT_TRAVEL,
     constraints: Constraints = _NO_CONSTRAINTS,
     top: Top | None = None,
@@ -53,18 +58,25 @@ def select(
     motions: MotionFile | None = None,
     refined: bool = True,
 ) -> Choice:
-    """Return the stored set with the greatest utility from the current state.
+    """Return the recommended set, or with weights the stored set with the greatest utility.
+
+    The recommended set is the most robust one where success under error was estimated
+    (`tcs.placement.robustness`): that of the greatest lower confidence bound. Without estimates it
+    is the set with the greatest utility from the current state by the default weights; and where
+    the current state is not known either, the set that reaches most goals, of these one with the
+    fewest members, of these the one with the greatest P_M.
 
     The result equals an exhaustive search of all stored sets; if delta is above 0, of all sets
-    whose success under error was estimated (`tcs.placement.robustness`). Ties go to the first set:
-    singles by configuration index, then pairs and then triples in lexicographic order.
+    whose success under error was estimated. Ties go to the first set: singles by configuration
+    index, then pairs and then triples in lexicographic order.
 
     Args:
         scores: A loaded score file; or its tables, which is faster for repeated selection.
         here: The current state of robot and environment, h_0, in the environment frame. The base
             may be anywhere; torso and environment axes must be within their scored range, with
-            half a step to spare.
-        weights: alpha, beta, gamma, delta.
+            half a step to spare. None if it is not known: then neither travel nor moving the
+            environment costs anything, and D is the distance between the members.
+        weights: alpha, beta, gamma, delta of the utility; None for the recommended set.
         travel: Cost of each type of motion.
         constraints: What every member of the set must satisfy. The stored sets that satisfy them
             are compared; no set is added for those that are excluded.
@@ -84,9 +96,10 @@ def select(
     Raises:
         StoreMismatchError: If the motions were planned for other scores.
         SelectionError: If no configuration reaches a goal, the current state is not finite, is out
-            of range or lacks an axis with a weight, `max_members` is not stored, no set is
-            reachable around the furniture or satisfies the constraints, or delta is above 0 and no
-            set has an estimate, or no triple although `max_members` is 3.
+            of range or lacks an axis with a weight, or is not given although `keep` needs it,
+            `max_members` is not stored, no set is reachable around the furniture or satisfies the
+            constraints, or delta is above 0 and no set has an estimate, or no triple although
+            `max_members` is 3.
         UnknownNameError: If an axis has no such name.
         GridError: If a condition of the constraints has the unit of another axis, or excludes
             every value of its axis.
@@ -99,7 +112,7 @@ def select(
     sets = tables.sets
     if max_members is None:
         max_members = sets.max_members
-    elif weights.success > 0.0:
+    elif weights is not None and weights.success > 0.0:
         check_estimated(sets, tables.success, max_members)
     _check_members(max_members, sets.max_members)
     if not len(sets.candidates):
@@ -110,7 +123,7 @@ def select(
     legs = legs_from(
         here, tables.grid, sets.candidates, sets.cell, tables.index.distances[travel.route], travel
     )
-    if not np.any(legs.reachable):
+    if here is not None and not np.any(legs.reachable):
         raise SelectionError(
             f"From ({here.base_x:.2f}, {here.base_y:.2f}) m no path around the furniture leads to "
             "any candidate base pose. Check the position, or use straight lines."
@@ -125,31 +138,51 @@ def select(
             raise SelectionError("Motions belong to a score file, not to a single table of it.")
         planned = motions_at(scores, motions, match)
         found = admitted_executable(planned, sets, constraints, found)
-    query = _Query(
-        tables, here, legs, weights, max_members, found, _disliked(constraints.prefer, tables)
+    ranked = partial(
+        ranking_of,
+        weights,
+        is_known=here is not None,
+        preferences=bool(constraints.prefer),
+        most_dexterity=float(sets.dexterity.max(initial=0.0)),
     )
-    offered: list[tuple[int, ...]] = []
-    while len(offered) < (1 if top is None else top.count):
-        distinct = None
-        if top is not None and offered:
-            distinct = Distinct(sets, top.min_apart, tuple(offered))
-        rows = query.best(distinct)
-        if rows is None:
-            break
-        offered.append(rows)
-    best, *others = (query.choice(rows) for rows in offered)
-    outside = warning_outside(legs, here, query.tour(best), tables.grid)
-    if outside is not None:
-        best = replace(best, warnings=(*best.warnings, outside))
+    # Estimates count every goal that a posture reaches.
+    ranking = ranked(estimated=tables.success is not None and motions is None)
+    query = _Query(
+        tables, here, legs, ranking, max_members, found, _disliked(constraints.prefer, tables)
+    )
+    if weights is None and ranking.basis == "success" and not query.has_estimated:
+        query = replace(query, ranking=ranked(estimated=False))
+    both = _Both(query, None, constraints)
+    warnings: tuple[str, ...] = ()
     if refined and tables.refined is not None:
-        compared = RefinedQuery(tables, tables.refined, here, legs, travel, weights, max_members)
         limbs = match is not None and len(match.by_frame) > 1
         only_grid = grid_only(
-            tables.refined, constraints, weights, limbs=limbs, motions=motions is not None
-        )
-        best, *others = compared.beside([best, *others], constraints, only_grid, top)
-    seconds = time.perf_counter() - start
-    return replace(best, alternatives=tuple(others), match=match, seconds=seconds)
+            tables.refined, constraints, query.ranking.weights, limbs=limbs,
+            motions=motions is not None,
+        )  # fmt: skip
+        if only_grid:
+            warnings = (f"Refined sets are not compared: {', '.join(only_grid)} need the grid.",)
+        else:
+            compared = RefinedQuery(tables, tables.refined, here, legs, travel, query.ranking)
+            both = replace(both, refined=compared)
+    offered = both.offered(top)
+    if not offered:
+        raise none_estimated(max_members)
+    best, *others = offered
+    outside = None
+    if here is not None and best.refined is None:
+        outside = warning_outside(legs, here, query.tour(best), tables.grid)
+    if outside is not None:
+        warnings = (outside, *warnings)
+    return replace(
+        best,
+        warnings=(*best.warnings, *warnings),
+        alternatives=tuple(others),
+        fewer=both.with_fewer(best),
+        basis=query.ranking.basis,
+        match=match,
+        seconds=time.perf_counter() - start,
+    )
 
 
 def _disliked(
@@ -165,7 +198,7 @@ def _disliked(
 
 def _tables_of(
     scores: ScoreFile | SelectionTables,
-    here: InitialConfiguration,
+    here: InitialConfiguration | None,
     observed: Mapping[str, float] | None,
     frames: Mapping[str, Sequence[float]] | None,
 ) -> tuple[Match | None, SelectionTables]:
@@ -199,12 +232,12 @@ def _check_members(requested: int, stored: int) -> None:
 
 @dataclass(frozen=True)
 class _Query:
-    """One selection: the sets, the state and the request."""
+    """One selection among the sets of the grid: the sets, the state and the request."""
 
     tables: SelectionTables
-    here: InitialConfiguration
+    here: InitialConfiguration | None
     legs: Legs
-    weights: UtilityWeights
+    ranking: Ranking
     max_members: int
     """Greatest number of members of a set."""
     found: Admitted | None
@@ -212,21 +245,19 @@ class _Query:
     disliked: tuple[NDArray[np.bool_], ...]
     """Whether a candidate violates each of the preferences, shapes (C,)."""
 
-    def best(self, distinct: Distinct | None) -> tuple[int, ...] | None:
+    def best(self, distinct: Distinct | None, max_members: int) -> tuple[int, ...] | None:
         """Return the candidate numbers of the best set, the first among equals.
 
         Args:
             distinct: Sets from which it must differ; None if there are none.
+            max_members: Greatest number of its members.
 
         Returns:
             The set, or None if no set differs from those.
         """
-        sets, legs, weights = self.tables.sets, self.legs, self.weights
+        legs, weights, to_gain = self.legs, self.ranking.weights, self.ranking.to_gain
         if weights.success > 0.0:
-            candidates = Candidates(self.admitted, *self.scores, self.penalties, distinct)
-            return best_estimated(
-                sets, self.tables.success, legs, weights, self.max_members, candidates
-            )
+            return self._best_estimated(distinct, max_members)
         singles = self.singles.copy()
         if distinct is not None:
             singles[~distinct.of_sets((np.arange(singles.size),))] = -np.inf
@@ -236,14 +267,32 @@ class _Query:
         if best == -np.inf:
             # Excluded candidates have a bound of -inf, which must not suffice.
             rows, best = None, -sys.float_info.max
-        for size, groups in enumerate(self.tables.index.groups[: self.max_members - 1], 2):
+        for size, groups in enumerate(self.tables.index.groups[: max_members - 1], 2):
             bounds = Bounds(
                 groups, legs, weights.of_size(size), self.found, self.penalties, distinct
             )
-            found = best_set(bounds, best)
+            found = best_set(bounds, best if rows is None else best + to_gain)
             if found is not None:
                 rows, best = found.members, found.utility
         return rows
+
+    def _best_estimated(
+        self, distinct: Distinct | None, max_members: int
+    ) -> tuple[int, ...] | None:
+        """Return the best of the sets with an estimate; as `best`.
+
+        Raises:
+            SelectionError: If no set has an estimate.
+        """
+        sets, success = self.tables.sets, self.tables.success
+        candidates = Candidates(self.admitted, *self.scores, self.penalties, distinct)
+        weights = self.ranking.weights
+        return best_estimated(sets, success, self.legs, weights, max_members, candidates)
+
+    @property
+    def has_estimated(self) -> bool:
+        """Whether a set with an estimate may be selected."""
+        return self._best_estimated(None, self.max_members) is not None
 
     @cached_property
     def singles(self) -> NDArray[np.float64]:
@@ -253,7 +302,7 @@ class _Query:
         if self.found is not None and self.found.has_lower_scores:
             reachability = tc_reachability(self.found.reached, sets.weights)
             manipulability = tc_manipulability(self.found.dexterity, sets.weights)
-        singles = utility(reachability, manipulability, self.legs.from_here, self.weights)
+        singles = utility(reachability, manipulability, self.legs.from_here, self.ranking.weights)
         if self.penalties is not None:
             singles -= self.penalties.of_candidates
         singles[~self.admitted] = -np.inf
@@ -262,8 +311,16 @@ class _Query:
     @cached_property
     def penalties(self) -> Penalties | None:
         """Penalties of the sets, if there are any."""
+        return self._penalties_by(self.ranking.weights)
+
+    @cached_property
+    def stated_penalties(self) -> Penalties | None:
+        """Penalties by the weights of the utility that is stated."""
+        return self._penalties_by(self.ranking.stated)
+
+    def _penalties_by(self, weights: UtilityWeights) -> Penalties | None:
         tables = self.tables
-        return penalties_of(self.weights, self.here, tables.grid, tables.sets, self.disliked)
+        return penalties_of(weights, self.here, tables.grid, tables.sets, self.disliked)
 
     @property
     def scores(self) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
@@ -312,10 +369,14 @@ class _Query:
             success = float(tables.success.success[row])
             interval = (float(tables.success.low[row]), float(tables.success.high[row]))
             low = interval[0]
-        scores = (reachability, manipulability, cost)
-        net = utility(*scores, self.weights.of_size(len(rows)), low)
+        scores, weights = (reachability, manipulability, cost), self.ranking.stated
+        net = utility(*scores, weights.of_size(len(rows)), low)
+        ranked = utility(*scores, self.ranking.weights.of_size(len(rows)), low)
+        columns = tuple(member[:, None])
+        if self.stated_penalties is not None:
+            net -= float(self.stated_penalties.of_sets(columns)[0])
         if self.penalties is not None:
-            net -= float(self.penalties.of_sets(tuple(member[:, None]))[0])
+            ranked -= float(self.penalties.of_sets(columns)[0])
         return Choice(
             members=members,
             indices=indices,
@@ -323,8 +384,9 @@ class _Query:
             reachability=reachability,
             manipulability=manipulability,
             cost=cost,
-            utility=utility(*scores, self.weights, low),
+            utility=utility(*scores, weights, low),
             net_utility=net,
+            ranked=ranked,
             moves=changed_axes(self.here, members),
             success=success,
             success_ci95=interval,
@@ -354,6 +416,50 @@ class _Query:
             if self.found is None and len(kept) < MOST_CHOSEN:
                 kept[rows] = found
         return found
+
+
+@dataclass(frozen=True)
+class _Both:
+    """One selection among the sets of the grid and the refined sets."""
+
+    query: _Query
+    refined: RefinedQuery | None
+    """The refined sets; None without any, or if they are not compared."""
+    constraints: Constraints
+
+    def offered(self, top: Top | None) -> list[Choice]:
+        """Return the best set, and further ones that differ from it and from each other."""
+        offered: list[Choice] = []
+        while len(offered) < (1 if top is None else top.count):
+            distinct = None
+            if top is not None and offered:
+                taken = tuple(choice.placed(self.query.tables.grid) for choice in offered)
+                distinct = Distinct(self.query.tables.sets, top.min_apart, taken)
+            found = self.best(distinct, self.query.max_members)
+            if found is None:
+                break
+            offered.append(found)
+        return offered
+
+    def with_fewer(self, best: Choice) -> Choice | None:
+        """Return the best set with fewer members than another; None if there is none."""
+        return self.best(None, len(best.members) - 1) if len(best.members) > 1 else None
+
+    def best(self, distinct: Distinct | None, max_members: int) -> Choice | None:
+        """Return the best set of the grid, or the best refined set if it is better."""
+        query = self.query
+        rows = query.best(distinct, max_members)
+        best = None if rows is None else query.choice(rows)
+        if self.refined is None:
+            return best
+        refined = self.refined.best(self.constraints, distinct, max_members)
+        rank = query.ranking.rank
+        if refined is None or (best is not None and rank(refined) <= rank(best)):
+            return best
+        if query.found is None:
+            return refined
+        # What a constraint leaves is counted on the grid.
+        return replace(refined, constraints=query.found.left, footprint=query.found.footprint)
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,8 +14,10 @@ from tcs.errors import SelectionError
 from tcs.model.grid import Grid, InitialConfiguration
 from tcs.placement.constraints import SAME_VALUE, Footprint, Postures
 from tcs.placement.selection.admission import Left
+from tcs.placement.selection.alternatives import Placed
 from tcs.placement.selection.index import SetIndex
 from tcs.placement.selection.observed import Match
+from tcs.placement.selection.ranking import Basis
 from tcs.placement.store import ScoreFile, files_of_arms
 from tcs.placement.store.robot_shapes import RobotShapes
 from tcs.placement.tables import RefinedTable, ScoreTable, SetTable, SuccessTable
@@ -116,10 +118,10 @@ class SelectionTables:
 
 
 def changed_axes(
-    here: InitialConfiguration, members: tuple[InitialConfiguration, ...]
+    here: InitialConfiguration | None, members: tuple[InitialConfiguration, ...]
 ) -> tuple[str, ...]:
     """Return the environment axes that change from the present state, or between members."""
-    now = dict(here.environment)
+    now = {} if here is None else dict(here.environment)
     return tuple(
         name
         for name, first in members[0].environment
@@ -171,7 +173,7 @@ class Choice:
     manipulability: float
     """P_M of the set, TCS eq. (4)."""
     cost: float
-    """D of the set from the current state."""
+    """D of the set from the current state; between its members alone where that is not known."""
     utility: float
     """alpha P_R + beta P_M - gamma D, TCS eq. (5), plus delta P_S if delta is not 0; P_S is the
     lower end of `success_ci95`."""
@@ -191,11 +193,17 @@ class Choice:
     """The floor that the robot covers, for forbidden regions; None without any."""
     net_utility: float
     """The utility less the penalties for further members, for moving the environment and for
-    violated preferences, by which sets are compared."""
+    violated preferences, by which sets are compared where weights were given."""
+    ranked: float = field(repr=False)
+    """What the set is compared by in this selection: see `tcs.placement.selection.ranking`."""
     moves: tuple[str, ...]
     """Environment axes that change from the present state to the members, or between these."""
     alternatives: tuple[Choice, ...] = ()
     """Further sets, the best first, if they were requested."""
+    fewer: Choice | None = None
+    """The best set with fewer members, which this one is better than; None without any."""
+    basis: Basis = "utility"
+    """By what it was chosen."""
     refined: int | None = None
     """Number of the refined set; None for a set of the grid."""
     warnings: tuple[str, ...] = ()
@@ -206,7 +214,8 @@ class Choice:
 
         Members and their configuration indices are in the order of the tour. Keys of success,
         observation, refined set, constraints and warnings are there only if success was estimated,
-        the file has observed axes, a refined set is chosen, there are constraints or warnings.
+        the file has observed axes, a refined set is chosen, there are constraints or warnings;
+        `fewer`, the best set with fewer members, only beside a set of several.
 
         Args:
             measure: Name of the dexterity measure behind the manipulability.
@@ -222,6 +231,7 @@ class Choice:
             "utility": self.utility,
             "net_utility": self.net_utility,
             "moves": list(self.moves),
+            "basis": self.basis,
             "unreachable": self.unreachable,
             "seconds": self.seconds,
         }
@@ -235,11 +245,18 @@ class Choice:
             plain["constraints"] = [left.to_json() for left in self.constraints]
         if self.footprint is not None:
             plain["footprint"] = self.footprint.to_json()
+        if self.fewer is not None:
+            plain["fewer"] = self.fewer.compared_with(self)
         if self.alternatives:
             plain["alternatives"] = [other.compared_with(self) for other in self.alternatives]
         if self.warnings:
             plain["warnings"] = list(self.warnings)
         return plain
+
+    def placed(self, grid: Grid) -> Placed:
+        """Return where the bases are, and the states of the environment; on the grid or off it."""
+        bases = np.array([(member.base_x, member.base_y) for member in self.members])
+        return Placed(bases, grid.state_of(np.array(self.indices, dtype=np.int64)))
 
     def compared_with(self, best: Choice) -> dict[str, Any]:
         """Return an alternative as plain containers, with what it trades against the best set.
@@ -252,6 +269,7 @@ class Choice:
             "members": [self.members[i].to_json() for i in self.order],
             **{name: round(getattr(self, name), 12) for name in names},
             "moves": list(self.moves),
+            **({} if self.success is None else {"success": self.success}),
             "trades": {
                 **{name: round(getattr(self, name) - getattr(best, name), 12) for name in names},
                 "places": len(self.members) - len(best.members),

@@ -50,11 +50,11 @@ def best_estimated(
         candidates: Which candidates may be selected, and what they reach.
 
     Returns:
-        Candidate numbers of its members, ascending; None if no set differs from those that it must
-        differ from.
+        Candidate numbers of its members, ascending; None if no set with an estimate is admitted and
+        differs from those that it must differ from.
 
     Raises:
-        SelectionError: If no set has an estimate, or none with an estimate is admitted.
+        SelectionError: If no set has an estimate.
     """
     if success is None:
         raise SelectionError(
@@ -80,13 +80,16 @@ def best_estimated(
         if found[first] > most:
             most = float(found[first])
             best = tuple(int(i) for i in members[first])
-    if best is None and candidates.distinct is None:
-        raise SelectionError(
-            "No set whose success under error was estimated is reachable from here and satisfies "
-            f"the constraints with at most {max_members} members. Use --delta 0, or estimate more "
-            "sets: tcs robustify FILE --sets."
-        )
     return best
+
+
+def none_estimated(max_members: int) -> SelectionError:
+    """Return the error that no set with an estimate is admitted."""
+    return SelectionError(
+        "No set whose success under error was estimated is reachable from here and satisfies "
+        f"the constraints with at most {max_members} members. Use --delta 0, or estimate more "
+        "sets: tcs robustify FILE --sets."
+    )
 
 
 def check_estimated(sets: SetTable, success: SuccessTable | None, max_members: int) -> None:

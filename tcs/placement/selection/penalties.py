@@ -50,7 +50,7 @@ class Penalties:
 
 def penalties_of(
     weights: UtilityWeights,
-    here: InitialConfiguration,
+    here: InitialConfiguration | None,
     grid: Grid,
     sets: SetTable,
     disliked: tuple[BoolArray, ...],
@@ -59,13 +59,14 @@ def penalties_of(
 
     Args:
         weights: Amounts of the penalties.
-        here: The current state; without a value of any environment axis, moving it is free.
+        here: The current state, if it is known; without a value of any environment axis, moving it
+            is free.
         grid: Grid of the candidates.
         sets: The candidates.
         disliked: Whether a candidate violates each of the preferences, shapes (C,).
     """
     flags, amounts = list(disliked), [float(weights.preference)] * len(disliked)
-    if weights.environment > 0.0 and here.environment:
+    if weights.environment > 0.0 and here is not None and here.environment:
         flags.append(moves_environment(here, grid)[sets.state])
         amounts.append(float(weights.environment))
     if not flags or not any(amounts):

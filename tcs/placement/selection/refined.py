@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from tcs.model.grid import AxisCondition, InitialConfiguration
 from tcs.placement.constraints import SAME_VALUE, Constraints, Footprint
-from tcs.placement.selection.alternatives import Top
+from tcs.placement.selection.alternatives import Distinct
 from tcs.placement.selection.choice import Choice, SelectionTables, changed_axes
 from tcs.placement.selection.distances import StraightDistances
+from tcs.placement.selection.ranking import Ranking
 from tcs.placement.selection.travel import Legs, TravelWeights, current_values, shortest_tour
 from tcs.placement.selection.utility import UtilityWeights, utility
 from tcs.placement.tables import RefinedTable
@@ -27,19 +28,21 @@ class RefinedQuery:
 
     tables: SelectionTables
     refined: RefinedTable
-    here: InitialConfiguration
+    here: InitialConfiguration | None
     legs: Legs
     """Legs to the candidates of the grid, for paths around the furniture."""
     travel: TravelWeights
-    weights: UtilityWeights
-    max_members: int
-    """Greatest number of members of a set."""
+    ranking: Ranking
 
-    def best(self, constraints: Constraints) -> Choice | None:
-        """Return the refined set with the greatest utility less penalties; None if there is none.
+    def best(
+        self, constraints: Constraints, distinct: Distinct | None, max_members: int
+    ) -> Choice | None:
+        """Return the best refined set; None if there is none.
 
         Args:
             constraints: Conditions, axes to keep and forbidden regions.
+            distinct: Sets from which it must differ; None if there are none.
+            max_members: Greatest number of its members.
 
         Raises:
             UnknownNameError: If the grid has no such axis.
@@ -48,35 +51,13 @@ class RefinedQuery:
         rows = [
             row
             for row in range(len(self.refined.origin))
-            if self.refined.sizes[row] <= self.max_members and self._admits(constraints, row)
+            if self.refined.sizes[row] <= max_members and self._admits(constraints, row)
         ]
         choices = [choice for row in rows if (choice := self._choice(row)) is not None]
-        return max(choices, key=lambda choice: choice.net_utility, default=None)
-
-    def beside(
-        self,
-        offered: list[Choice],
-        constraints: Constraints,
-        only_grid: tuple[str, ...],
-        top: Top | None,
-    ) -> list[Choice]:
-        """Return the sets of the grid with the best refined set before them if it is better.
-
-        Args:
-            offered: Sets of the grid, the best first.
-            constraints: Constraints of the selection.
-            only_grid: What refined sets cannot answer, see `grid_only`.
-            top: Number of sets to offer; None for one.
-        """
-        best, *others = offered
-        if only_grid:
-            warning = f"Refined sets are not compared: {', '.join(only_grid)} need the grid."
-            return [replace(best, warnings=(*best.warnings, warning)), *others]
-        better = self.best(constraints)
-        if better is None or better.net_utility <= best.net_utility:
-            return offered
-        first = replace(better, constraints=best.constraints, footprint=best.footprint)
-        return [first, *(offered if top is not None else [])][: 1 if top is None else top.count]
+        if distinct is not None:
+            grid = self.tables.grid
+            choices = [choice for choice in choices if distinct.admits(choice.placed(grid))]
+        return max(choices, key=self.ranking.rank, default=None)
 
     def _values(self, row: int) -> FloatArray:
         """Return the values of the members of a set, shape (m, axes)."""
@@ -90,7 +71,9 @@ class RefinedQuery:
             axis = condition.axis_of(grid)
             if not np.all(condition.satisfied(axis, values[:, grid.axes.index(axis)])):
                 return False
-        now = current_values(self.here, grid, ()) if constraints.keep else {}
+        now = {}
+        if constraints.keep and self.here is not None:
+            now = current_values(self.here, grid, ())
         for name in constraints.keep:
             change = values[:, grid.axes.index(grid.axis(name))] - now.get(name, math.inf)
             if name == "base_yaw":
@@ -113,9 +96,12 @@ class RefinedQuery:
         cells = self._cells[row, :count]
         if not np.all(self.legs.reachable[cells]):
             return None
-        from_here = [
-            self._leg(here, member, None, int(c)) for member, c in zip(members, cells, strict=True)
-        ]
+        from_here = [0.0] * count
+        if here is not None:
+            from_here = [
+                self._leg(here, member, None, int(c))
+                for member, c in zip(members, cells, strict=True)
+            ]
         between = np.array(
             [
                 [self._leg(a, b, int(i), int(j)) for b, j in zip(members, cells, strict=True)]
@@ -130,9 +116,15 @@ class RefinedQuery:
             success = float(refined.success.mean[row])
             interval = (float(refined.success.low[row]), float(refined.success.high[row]))
             low = interval[0]
-        net = utility(*scores, self.weights.of_size(count), low)
-        if here.environment and moves:
-            net -= float(self.weights.environment)
+        net, ranked = (
+            utility(*scores, weights.of_size(count), low)
+            - (
+                float(weights.environment)
+                if here is not None and here.environment and moves
+                else 0.0
+            )
+            for weights in (self.ranking.stated, self.ranking.weights)
+        )
         return Choice(
             members=members,
             indices=tuple(int(h) for h in refined.origin[row, :count]),
@@ -140,8 +132,9 @@ class RefinedQuery:
             reachability=scores[0],
             manipulability=scores[1],
             cost=cost,
-            utility=utility(*scores, self.weights, low),
+            utility=utility(*scores, self.ranking.stated, low),
             net_utility=net,
+            ranked=ranked,
             moves=moves,
             success=success,
             success_ci95=interval,
@@ -183,6 +176,8 @@ class RefinedQuery:
         else:
             between = self.legs.distances.between(np.array(start_cell), np.array(end_cell))
             metres = float(between) + self._offset(start, start_cell) + self._offset(end, end_cell)
+        if self.here is None:
+            return self.travel.metre * metres
         turn = abs(math.remainder(end.base_yaw - start.base_yaw, 2.0 * math.pi))
         cost = self.travel.metre * metres + self.travel.turn * turn
         cost += self.travel.torso * abs(end.torso - start.torso)

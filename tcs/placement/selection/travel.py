@@ -126,7 +126,7 @@ class Legs:
 
 
 def legs_from(
-    here: InitialConfiguration,
+    here: InitialConfiguration | None,
     grid: Grid,
     candidates: NDArray[np.int32],
     cell: NDArray[np.int32],
@@ -136,7 +136,8 @@ def legs_from(
     """Return the legs between the current state and the candidates of a grid.
 
     Args:
-        here: The current state h_0. Environment axes matter only if they have a weight.
+        here: The current state h_0. Environment axes matter only if they have a weight. None if it
+            is not known: then only the driving between the candidates costs.
         grid: Grid of the candidates.
         candidates: Flat indices of the candidates, shape (C,).
         cell: Their base cells, shape (C,).
@@ -149,12 +150,17 @@ def legs_from(
             axis with a weight, or if no path starts at its position.
     """
     names, level_weights = _weighted_levels(grid, weights)
-    current = current_values(here, grid, names)
-    _check_range(current, grid)
+    current: dict[str, float] = {}
+    metres = np.zeros(len(distances.cell_xy))
+    if here is None:
+        names, level_weights = (), ()
+    else:
+        current = current_values(here, grid, names)
+        _check_range(current, grid)
+        metres = distances.from_position(float(here.base_x), float(here.base_y))
     # Coordinates are looked up only if they have a weight: that takes longer than selecting.
     values = grid.values(candidates) if names else {}
     levels = [values[name] for name in names]
-    metres = distances.from_position(float(here.base_x), float(here.base_y))
     reachable = np.isfinite(metres)
     return Legs(
         cell=cell,
@@ -163,7 +169,7 @@ def legs_from(
         reachable=reachable,
         levels=np.stack(levels, axis=1) if names else np.zeros((len(candidates), 0)),
         level_weights=level_weights,
-        turns=weights.turn > 0.0,
+        turns=bool(names) and weights.turn > 0.0,
         here_levels=np.array([current[name] for name in names], dtype=np.float64),
         metre=float(weights.metre),
     )

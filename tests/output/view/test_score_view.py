@@ -4,6 +4,7 @@ import dataclasses
 
 import pytest
 
+import tcs
 from tcs.errors import OutputError
 from tcs.model.grid import InitialConfiguration
 from tcs.output.view import (
@@ -59,10 +60,11 @@ def built(monkeypatch, scene):
     return requested
 
 
-def test_the_view_shows_the_best_set_without_a_current_state(file, built):
+def test_the_view_shows_the_recommended_set_without_a_current_state(file, built):
     made = make_score_view(file)
-    assert made.viewed.members == file.nominal.sets.best
-    assert made.subtitle.startswith("best set: ")
+    choice = tcs.select(file)
+    assert made.viewed.members == tuple(choice.indices[i] for i in choice.order)
+    assert made.subtitle.startswith("recommended, most goals, then fewest stops: ")
     assert "PR2" in made.title
     assert built == [False]
 

@@ -10,6 +10,7 @@ import tcs
 from tcs.files.paths import data_folder
 from tcs.model.grid import InitialConfiguration
 from tcs.output.terminal.tables import NUMERIC_NOTE, report_scores
+from tcs.output.words import summary_in_words
 from tcs.placement.reasons import explain
 from tcs.placement.scoring import score, summary, verify
 from tcs.placement.selection import select
@@ -59,7 +60,7 @@ def test_the_file_records_numeric_ik(scored, tmp_path, capsys):
     path = tmp_path / "bent.tcs"
     tcs.save(path, scored)
     assert tcs.load(path).metadata["ik"] == "numeric"
-    report_scores({**figures, "file": str(path)})
+    report_scores({**summary_in_words(scored, figures), "file": str(path)})
     printed = " ".join(capsys.readouterr().out.split())
     assert NUMERIC_NOTE in printed
 
@@ -68,7 +69,7 @@ def test_the_closed_form_is_recorded_without_a_note(capsys):
     figures = {
         "ik": "analytic", "configurations": 1, "goals": 1, "scoring_seconds": 0.1, "candidates": 0,
         "tile": 0.0, "sets": 0, "reasons": {}, "best_single": None, "best": None, "file": "x",
-        "pairs": 1, "approach": None,
+        "pairs": 1, "approach": None, "recommended": None,
     }  # fmt: skip
     report_scores(figures)
     assert "Numeric" not in capsys.readouterr().out

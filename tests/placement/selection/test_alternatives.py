@@ -1,5 +1,8 @@
+import dataclasses
+import itertools
 import math
 
+import numpy as np
 import pytest
 
 from tcs.errors import GridError, SelectionError, UnknownNameError
@@ -7,6 +10,7 @@ from tcs.model.grid import InitialConfiguration
 from tcs.placement.constraints import Constraints
 from tcs.placement.scoring.sets import build_sets
 from tcs.placement.selection import SelectionTables, Top, TravelWeights, UtilityWeights, select
+from tcs.placement.tables import RefinedTable
 from tests.placement.selection.test_choice import brute_force, keeps
 from tests.placement.store.example import score_file
 from tests.placement.tables.small import all_sets, random_scores, small_grid
@@ -179,3 +183,37 @@ def test_numbers_out_of_range(values, message):
 def test_penalties_out_of_range():
     with pytest.raises(SelectionError, match=r"must be at most 0\.5"):
         UtilityWeights(places=0.6)
+
+
+def test_alternatives_to_a_refined_set_are_apart_from_it(scored):
+    tables, _ = scored
+    best = select(tables, HERE)
+    shift = 0.02
+    origin = np.array([best.indices], dtype=np.int32)
+    named = [axis.name for axis in GRID.axes]
+    values = np.zeros((1, len(best.members), len(named)))
+    for i, member in enumerate(best.members):
+        at = {**dataclasses.asdict(member), **dict(member.environment)}
+        values[0, i] = [at[name] + shift * (name == "base_x") for name in named]
+    rows = np.searchsorted(tables.sets.candidates, best.indices)
+    reached = tables.sets.reached[rows][None]
+    refined = RefinedTable(
+        origin=origin,
+        values=values,
+        reached=reached,
+        dexterity=np.where(reached, np.float32(1.0), np.float32(0.0)),
+        arm_joints=np.zeros((*reached.shape, 7), dtype=np.float32),
+        objective=np.ones(1),
+        weights=tables.sets.weights,
+    )
+    tables = dataclasses.replace(tables, refined=refined)
+    found = select(tables, HERE, top=Top(count=4, min_apart=0.5))
+    assert found.refined == 0
+    offered = [found, *found.alternatives]
+    assert len(offered) == 4
+    for one, other in itertools.combinations(offered, 2):
+        bases, others = ([(m.base_x, m.base_y) for m in c.members] for c in (one, other))
+        states = [{m.environment for m in c.members} for c in (one, other)]
+        far = any(all(math.dist(a, b) >= 0.5 - 1e-9 for b in others) for a in bases)
+        far |= any(all(math.dist(a, b) >= 0.5 - 1e-9 for a in bases) for b in others)
+        assert far or states[0] != states[1]

@@ -200,7 +200,7 @@ def make_score_report(
 
     Args:
         path: A score file.
-        here: The current state; if None, the set with the best scores is reported.
+        here: The current state; None if it is not known.
         max_members: Most members of the set; by default as many as the file holds.
         observed: Observed values of the observed axes [m or rad].
         refined: Whether a refined set may be reported.

@@ -34,7 +34,7 @@ def draw_row(path: Path) -> RowPictures:
         StoreError: If the file cannot be used, or was made from other models.
     """
     file = load_scores(path)
-    shown = ShownSet.of(file, None)
+    shown = ShownSet.best_of(file)
     return RowPictures(as_png(map_figure(file, shown)), as_png(scene_figure(file, shown)))
 
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
-import numpy as np
-
-from tcs.model.grid import Grid, InitialConfiguration
+from tcs.model.grid import InitialConfiguration
 from tcs.output.words import (
     base_pose_text,
+    basis_text,
+    gain_text,
     goal_names,
     member_places,
     place_in_line,
@@ -19,7 +19,7 @@ from tcs.output.words import (
     scores_text,
 )
 from tcs.placement.refinement import refined_table, score_members
-from tcs.placement.selection import SelectionTables, UtilityWeights, nearest_table, select
+from tcs.placement.selection import Choice, nearest_table, select
 from tcs.placement.store import ScoreFile
 from tcs.placement.tables import RefinedSet, ScoreTable, SuccessTable
 
@@ -42,7 +42,7 @@ class ShownSet:
     """One set, its members in the order of the tour."""
 
     here: InitialConfiguration | None
-    """The current state for which the set was selected; None for the set with the best scores."""
+    """The current state for which the set was selected; None if it is not known."""
     members: tuple[InitialConfiguration, ...]
     """Its configurations; empty if no configuration reaches a goal."""
     indices: tuple[int, ...]
@@ -53,8 +53,8 @@ class ShownSet:
     """How the set was selected, and its scores, as one line of text."""
     file: ScoreFile = field(repr=False, compare=False)
     """The score file."""
-    refined: RefinedSet | None = None
-    """The refined set that is shown; None for a set of the grid."""
+    choice: Choice | None = field(default=None, repr=False, compare=False)
+    """What `tcs.select` returned; None for a set that was given."""
 
     @classmethod
     def of(
@@ -66,63 +66,65 @@ class ShownSet:
         *,
         refined: bool = True,
     ) -> ShownSet:
-        """Return the set selected for the current state, or the best set if `here` is None.
-
-        In a file with refined sets, the best set is the best of these.
+        """Return the set that `tcs.select` recommends.
 
         Args:
             file: A score file.
-            here: The current state.
+            here: The current state; None if it is not known.
             max_members: Most members of the set; by default as many as the file holds.
             observed: Observed values of the observed axes [m or rad].
             refined: Whether a refined set may be shown.
+
+        Raises:
+            SelectionError: If the file holds no sets of that many members, or no set can be
+                selected from the current state.
         """
         table = nearest_table(file, here, observed).index
-        sets = file.tables[table].sets
+        if here is None and not len(file.tables[table].sets.candidates):
+            return cls(None, (), (), table, "no configuration reaches a goal", file)
+        choice = select(file, here, max_members=max_members, observed=observed, refined=refined)
+        scores = scores_text(choice.reachability, choice.manipulability, file.metadata["measure"])
+        what = f"recommended, {basis_text(choice.basis)}: {scores}"
         if here is not None:
-            choice = select(file, here, max_members=max_members, observed=observed, refined=refined)
-            members = tuple(choice.members[i] for i in choice.order)
-            indices = tuple(choice.indices[i] for i in choice.order)
             place = place_of_state(file, table, here)
             now = f"{place_in_line(place)}, at " if place else "at "
             what = (
                 f"selected for a robot {now}{base_pose_text(here.to_json())}, "
-                f"travel cost {choice.cost:.2f}"
+                f"travel cost {choice.cost:.2f}, {what}"
             )
-            if choice.refined is not None:
-                chosen = RefinedSet(table, choice.refined, tuple(choice.order))
-                return cls._of_refined(file, chosen, here, what)
-        elif refined and (row := _best_refined(file, table, max_members)) is not None:
-            table_of_refined = refined_table(file, table)
-            order = tuple(range(int(table_of_refined.sizes[row])))
-            return cls._of_refined(file, RefinedSet(table, row, order), None, "best refined set")
-        else:
-            indices = _best_of(file, table, max_members)
-            grid = Grid.from_dict(file.grid)
-            members = tuple(grid.configuration(h) for h in indices)
-            what = "best set"
-        if not members:
-            return cls(None, (), (), table, "no configuration reaches a goal", file)
-        scores = scores_text(*sets.scores_of(tuple(sorted(indices))), file.metadata["measure"])
-        return cls(here, members, indices, table, f"{what}: {scores}", file)
-
-    @classmethod
-    def _of_refined(
-        cls, file: ScoreFile, chosen: RefinedSet, here: InitialConfiguration | None, what: str
-    ) -> ShownSet:
-        """Return a refined set."""
-        refined = refined_table(file, chosen.table)
-        members = refined.members(file.configurations, chosen.row)
-        pair = float(refined.reachability[chosen.row]), float(refined.manipulability[chosen.row])
         return cls(
             here,
-            tuple(members[i] for i in chosen.order),
-            tuple(int(refined.origin[chosen.row, i]) for i in chosen.order),
-            chosen.table,
-            f"{what}: {scores_text(*pair, file.metadata['measure'])}",
+            tuple(choice.members[i] for i in choice.order),
+            tuple(choice.indices[i] for i in choice.order),
+            table,
+            "; ".join(part for part in (what, gain_text(choice)) if part),
             file,
-            chosen,
+            choice,
         )
+
+    @classmethod
+    def best_of(cls, file: ScoreFile, *, single: bool = False) -> ShownSet:
+        """Return the set with the greatest P_R + P_M in the nominal state, as the papers rank sets.
+
+        Args:
+            file: A score file.
+            single: Whether to take the best set of one configuration.
+        """
+        sets, grid = file.nominal.sets, file.configurations
+        members = sets.best_single if single else sets.best
+        table = file.nominal_index
+        if not members:
+            return cls(None, (), (), table, "no configuration reaches a goal", file)
+        scores = scores_text(*sets.scores_of(members), file.metadata["measure"])
+        places = tuple(grid.configuration(h) for h in members)
+        return cls(None, places, members, table, f"best set: {scores}", file)
+
+    @property
+    def refined(self) -> RefinedSet | None:
+        """The refined set that is shown; None for a set of the grid."""
+        if self.choice is None or self.choice.refined is None:
+            return None
+        return RefinedSet(self.table, self.choice.refined, self.choice.order)
 
     @property
     def stored(self) -> tuple[int, ...]:
@@ -186,34 +188,6 @@ class ShownSet:
         refined = refined_table(self.file, self.refined.table)
         row = self.refined.row
         return float(refined.reachability[row]), float(refined.manipulability[row])
-
-
-def _best_refined(file: ScoreFile, table: int, max_members: int | None) -> int | None:
-    """Return the number of the best refined set of a table with few enough members."""
-    refined = file.tables[table].refined
-    if refined is None:
-        return None
-    rows = np.flatnonzero(refined.sizes <= (max_members or refined.origin.shape[1]))
-    return int(rows[0]) if rows.size else None
-
-
-def _best_of(file: ScoreFile, table: int, max_members: int | None) -> tuple[int, ...]:
-    """Return the best set of a table with at most `max_members` members, without travel costs.
-
-    Raises:
-        SelectionError: If the file holds no sets of that many members.
-    """
-    sets = file.tables[table].sets
-    if max_members is None or len(sets.best) <= max_members <= sets.max_members:
-        return sets.best
-    if max_members == 1:
-        return sets.best_single
-    # Without a weight of travel the current state does not matter.
-    anywhere = InitialConfiguration(base_x=0.0, base_y=0.0, base_yaw=0.0, torso=0.0)
-    free = UtilityWeights(travel=0.0, places=0.0, environment=0.0)
-    tables = SelectionTables.of(file, table)
-    choice = select(tables, anywhere, weights=free, max_members=max_members, refined=False)
-    return choice.indices
 
 
 def estimate_of(success: SuccessTable | None, members: tuple[int, ...]) -> SuccessEstimate | None:

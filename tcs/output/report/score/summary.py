@@ -8,6 +8,7 @@ from tcs.output.report.score.report import ScoreReport
 from tcs.output.words import (
     REASON_TEXTS,
     base_pose_text,
+    gain_text,
     goals_text,
     percent,
     percentage,
@@ -19,6 +20,14 @@ from tcs.placement.constraints import constraint_texts
 from tcs.placement.store import APPROACH, WITHOUT_APPROACH, state_to_json
 from tcs.placement.tables import Reason
 
+_BASES = {
+    "success": "the most robust one, with the greatest lower confidence bound of the success under "
+    "error",
+    "goals": "the one that reaches most goals, of these one with the fewest stops, of these the "
+    "one with the greatest P_M",
+    "utility": "the one with the greatest utility by the default weights",
+}
+"""Why a set is recommended, by `Choice.basis`."""
 PATHS = "the path of the arm between goals and the path of the base between stops are not"
 """What no score file says anything about."""
 
@@ -42,15 +51,14 @@ def summary_blocks(report: ScoreReport) -> list[Block]:
             f"Not reached: {goals_text(report.unreached, report.goal_names)}. The section Goals "
             "gives the reasons and the changes that would help."
         )
+    of_size = "" if report.max_members is None else f" of at most {report.max_members}"
+    here = "wherever the robot is now"
     if report.shown.here is not None:
-        here = base_pose_text(report.shown.here.to_json())
-        items.append(f"The set is selected with the default weights for a robot at {here}.")
-    else:
-        of_size = "" if report.max_members is None else f" of at most {report.max_members}"
-        items.append(
-            f"Of the sets{of_size} in the file this one has the greatest P_R + P_M, regardless of "
-            "the current base pose of the robot."
-        )
+        here = f"for a robot at {base_pose_text(report.shown.here.to_json())}"
+    if report.shown.choice is not None:
+        why, gain = _BASES[report.shown.choice.basis], gain_text(report.shown.choice)
+        items.append(f"Recommended {here}, of the sets{of_size} in the file: {why}.")
+        items += [f"{gain}."] if gain else []
     state = report.file.observed_states[report.shown.table]
     if state:
         values = settings_text(state_to_json(report.file.observed_axes, state))
