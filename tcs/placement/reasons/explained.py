@@ -32,6 +32,8 @@ class ExplainedConfiguration:
     """The two bodies in contact, if any; for the arm, those of its best posture."""
     dexterity: float
     """Dexterity at the goal; 0 if it is not reached."""
+    of_arms: tuple[int, ...]
+    """Flat indices by every arm, where none was stated of several; else the index alone."""
 
     @classmethod
     def of(
@@ -51,12 +53,13 @@ class ExplainedConfiguration:
             SelectionError: If a value is not finite, or an axis is missing or exceeded.
             UnknownNameError: If an environment axis has no such name.
         """
+        of_arms: tuple[int, ...] = ()
         if isinstance(requested, InitialConfiguration):
             index, stated = nearest_configuration(grid, requested)
             if requested.arm is None and grid.arms:
                 # The first arm that reaches the goal, else the first.
-                of_arms = np.arange(index, grid.size, grid.arm_size)
-                index = int(of_arms[np.argmax(scores.reached[of_arms, goal])])
+                of_arms = tuple(range(index, grid.size, grid.arm_size))
+                index = of_arms[int(np.argmax(scores.reached[list(of_arms), goal]))]
                 stated = dataclasses.replace(stated, arm=grid.arm_of(index))
         else:
             index, stated = int(requested), grid.configuration(requested)
@@ -68,6 +71,7 @@ class ExplainedConfiguration:
             reason=Reason(scores.reason[index, goal]),
             pair=scores.pair_names[pair] if pair >= 0 else None,
             dexterity=float(scores.dexterity[index, goal]),
+            of_arms=of_arms or (index,),
         )
 
     @property

@@ -1,4 +1,4 @@
-"""The nearest configuration that reaches a goal, by the cost of the changes to it."""
+"""The nearest configuration that reaches a goal and keeps the others, by the cost of changes."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ side can cost 1e-16 less than a step to the other."""
 
 @dataclass(frozen=True, kw_only=True)
 class Fix:
-    """The cheapest configuration that reaches the goal, and the changes to get there."""
+    """The configuration to change to, and the changes to get there."""
 
     index: int
     """Flat index of the configuration."""
@@ -58,7 +58,8 @@ class Fix:
     reached: tuple[int, ...]
     """All goals it reaches."""
     lost: tuple[int, ...]
-    """Goals reached from the explained configuration and not from this one."""
+    """Goals reached from the explained configuration and not from this one, by any arm where none
+    was stated."""
 
     @property
     def changes(self) -> tuple[Change, ...]:
@@ -137,9 +138,10 @@ def nearest_fix(
     start: ExplainedConfiguration,
     weights: TravelWeights,
 ) -> tuple[Fix | None, int]:
-    """Return the cheapest configuration that reaches the goal.
+    """Return the cheapest configuration that reaches the goal and loses fewest others.
 
-    Ties go to the greatest P_M, then to the first configuration.
+    It loses none if there is such a configuration: a cheaper change that makes the task worse is no
+    help. Ties go to the greatest P_M, then to the first configuration.
 
     Args:
         grid: The grid that was scored.
@@ -168,12 +170,21 @@ def nearest_fix(
     unreachable = int(np.count_nonzero(~legs.reachable))
     if unreachable == len(rows):
         return None, unreachable
+    held = scores.reached[list(start.of_arms)].any(axis=0)
+    # By any arm, where the start is of any arm.
+    to_arms = np.array(start.of_arms) - start.index
+    first = rows
+    if len(start.of_arms) > 1:
+        first, to_arms = rows % grid.arm_size, np.array(start.of_arms) - start.of_arms[0]
+    kept = scores.reached[first[:, None] + to_arms].any(axis=1)
+    losses = np.count_nonzero(held & ~kept, axis=1)
+    cost[losses > losses[np.isfinite(cost)].min()] = np.inf
     near = np.flatnonzero(cost <= cost.min() + TIE)
     manipulability = tc_manipulability(scores.dexterity[rows[near]], scores.weights)
     best = int(near[np.argmax(manipulability)])
     driving = distances.from_position(start.stated.base_x, start.stated.base_y)[best]
     index = int(rows[best])
-    here, there = scores.reached[start.index], scores.reached[index]
+    there = scores.reached[index]
     fix = Fix(
         index=index,
         configuration=grid.configuration(index),
@@ -185,7 +196,7 @@ def nearest_fix(
         reachability=float(tc_reachability(there, scores.weights)),
         manipulability=float(tc_manipulability(scores.dexterity[index], scores.weights)),
         reached=tuple(np.flatnonzero(there).tolist()),
-        lost=tuple(np.flatnonzero(here & ~there).tolist()),
+        lost=tuple(np.flatnonzero(held & ~kept[best]).tolist()),
     )
     return fix, unreachable
 

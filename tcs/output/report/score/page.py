@@ -110,10 +110,14 @@ def _goals(report: ScoreReport) -> list[Block]:
     for goal in report.unreached if report.shown.members else ():
         fix = report.explanation(goal).fix
         if fix is not None:
+            lost = ""
+            if fix.lost:
+                lost = f" No longer reached then: {goals_text(fix.lost, report.goal_names)}."
             blocks.append(
                 Text(
                     f"The cheapest change from stop 1 that reaches goal "
-                    f"{goal_text(goal, report.goal_names[goal])}: {fix.sentence}"
+                    f"{goal_text(goal, report.goal_names[goal])} and loses "
+                    f"{'fewest others' if fix.lost else 'no other'}: {fix.sentence}{lost}"
                 )
             )
     if report.shown.members:
