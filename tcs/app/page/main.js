@@ -127,8 +127,9 @@ async function openFile(wanted = new URLSearchParams()) {
   map.suggest([]);
   links();
   const given = ["x", "y", "yaw"].map((name) => wanted.get(name)).every((value) => value !== null);
-  const pose = given ? { x: Number(wanted.get("x")), y: Number(wanted.get("y")), yaw: Number(wanted.get("yaw")) } : bestPlace();
-  await move(pose, { best: !given });
+  const first = given || wanted.has("state") ? null : await firstPlace();
+  if (first) await showPlace(first);
+  else await move(given ? { x: Number(wanted.get("x")), y: Number(wanted.get("y")), yaw: Number(wanted.get("yaw")) } : bestPlace(), { best: !given });
   // The rest arrives while the page is in use.
   const opened = view;
   page.original = opened;
@@ -213,7 +214,17 @@ function drawFloor() {
   map.floor(floor(), by("score-of").value);
 }
 
-// Returns the base position with the greatest score, where the page begins.
+// Returns the first place of the recommended set, where the page begins; null if no place is reached from anywhere.
+async function firstPlace() {
+  try {
+    return (await post("select", { file: view.file })).members[0];
+  } catch (error) {
+    if (error instanceof Refusal) return null;
+    throw error;
+  }
+}
+
+// Returns the base position with the greatest score in the visible state.
 function bestPlace() {
   const { x, y, reachability, headings_deg } = floor();
   const yaw = headings_deg[0];
@@ -373,7 +384,7 @@ function show(outcome) {
 function command() {
   const { x, y, yaw } = map.pose;
   const settings = Object.entries(at()).map(([name, value]) => ` --at ${name}=${value}`).join("");
-  const weights = ["alpha", "beta", "gamma"].map((name) => ` --${name} ${by(name).value}`).join("");
+  const weights = Object.entries(weightsGiven()).map(([name, value]) => ` --${name} ${value}`).join("");
   const here = `--here ${x.toFixed(3)} ${y.toFixed(3)} ${yaw.toFixed(1)} --torso ${page.torso}${settings}`;
   const name = fileName(".tcs");
   const scoring = `tcs score ${file().task} --environment ${by("downloadEnvironment").download} --robot ${file().robot} --out ${name}\n`;
@@ -395,32 +406,48 @@ async function why(goal) {
 async function fixOf(goal) {
   const explanation = await explained(goal);
   const fix = explanation.nearest_reaching;
-  if (fix) await go(fix.members[0]);
-  else showWhy(goal, explanation, page.outcome.goals, [], () => {});
+  if (fix && !fix.lost_goals.length) await go(fix.members[0]);
+  else showWhy(goal, explanation, page.outcome.goals, [], () => go(fix.members[0]));
 }
 
-// Goes to a configuration: its base pose, torso height and state of the environment.
-async function go(member) {
+// Returns the number of the state of the environment that is nearest to that of a configuration.
+function stateOf(member) {
   const distance = (settings) => Object.entries(settings).reduce((sum, [name, value]) => sum + Math.abs(member[name] - value) / (name.endsWith("_deg") ? 60 : 1), 0);
-  const state = floor().states.reduce((best, settings, i, all) => (distance(settings) < distance(all[best]) ? i : best), 0);
+  return floor().states.reduce((best, settings, i, all) => (distance(settings) < distance(all[best]) ? i : best), 0);
+}
+
+// Shows a configuration: its base pose, torso height and state of the environment.
+async function showPlace(member) {
+  const state = stateOf(member);
   const pose = { x: member.base_x, y: member.base_y, yaw: member.base_yaw_deg };
   page.torso = member.torso;
   map.place(pose);
   if (state !== view.state) await changeState(state);
   else await move(pose);
+}
+
+async function go(member) {
+  await showPlace(member);
   by("map").focus({ preventScroll: true });
+}
+
+// The weights that an expert has changed: with any of them the utility decides, not the recommendation.
+function weightsGiven() {
+  const names = ["alpha", "beta", "gamma"];
+  if (names.every((name) => by(name).value === by(name).defaultValue)) return {};
+  return Object.fromEntries(names.map((name) => [name, Number(by(name).value)]));
 }
 
 async function suggest(number) {
   const { x, y, yaw } = map.pose;
-  const weights = Object.fromEntries(["alpha", "beta", "gamma"].map((name) => [name, Number(by(name).value)]));
-  const asked = { file: view.file, here: [x, y, yaw], torso: page.torso, at: at(), ...weights };
+  const asked = { file: view.file, here: [x, y, yaw], torso: page.torso, at: at(), ...weightsGiven() };
   const choices = [];
-  for (const max_members of SIZES) {
+  // The recommended set first; others have fewer places, or reach more.
+  for (const size of [{}, ...SIZES.map((max_members) => ({ max_members }))]) {
     try {
-      const choice = await post("select", { ...asked, max_members });
-      // A larger set is offered only where it reaches more.
-      if (!choices.some((other) => other.reachability >= choice.reachability - 1e-9)) choices.push(choice);
+      const choice = await post("select", { ...asked, ...size });
+      const isOther = choices.every((other) => choice.members.length < other.members.length || choice.reachability > other.reachability + 1e-9);
+      if (isOther) choices.push(choice);
     } catch (error) {
       if (!(error instanceof Refusal)) throw error;
     }

@@ -49,26 +49,46 @@ export function showWhy(goal, explanation, goals, touching, onFix) {
   if (!fix) {
     made("p", t("noFix"), card);
   } else {
-    made("p", t("fix", { change: changes(fix) }), card);
-    if (fix.lost_goals.length) {
+    const isLosing = fix.lost_goals.length > 0;
+    made("p", t(isLosing ? "fixLosing" : "fix", { change: changes(fix) }), card);
+    if (isLosing) {
       made("p", t("loses", { goals: fix.lost_goals.map((number) => goalName(goals[number])).join("; ") }), card);
     }
-    made("button", t("apply"), card, { type: "button" }).onclick = () => onFix(fix);
+    made("button", t(isLosing ? "applyLosing" : "apply"), card, { type: "button" }).onclick = () => onFix(fix);
   }
   card.focus();
 }
 
-// `choices` are sets of one, two or three places, each with the greatest utility of its size.
+// What a set of several places gains over fewer, in words.
+function gainOf({ fewer, members, ...choice }) {
+  const digits = { success: (value) => (100 * value).toFixed(1), reachability: (value) => (100 * value).toFixed(1), manipulability: (value) => value.toFixed(3) };
+  const gains = Object.entries(digits)
+    .filter(([name]) => choice[name] !== undefined && fewer[name] !== undefined)
+    .map(([name, text]) => ({ name, after: text(choice[name]), before: text(fewer[name]) }))
+    .filter(({ after, before }) => after !== before)
+    .map(({ name, ...values }) => t(`gains.${name}`, values));
+  return gains.length ? t("gain", { count: members.length, fewer: fewer.members.length, gains: gains.join(", ") }) : "";
+}
+
+// The distance to drive and the time for it, both rounded up to what is shown.
+function travelOf(cost) {
+  const metres = Math.ceil(10 * cost - 1e-6) / 10;
+  return metres > 0 ? t("travel", { metres: metres.toFixed(1), seconds: Math.ceil(metres / SPEED - 1e-6), speed: SPEED }) : t("there");
+}
+
+// `choices` are sets of places, the recommended one first.
 export function showCards(choices, onGo, onShow) {
   const cards = by("cards");
   cards.replaceChildren();
   if (!choices.length) made("p", t("noAlternative"), cards);
-  for (const choice of choices) {
+  choices.forEach((choice, number) => {
     const card = made("div", undefined, cards, { class: "card" });
     const percent = Math.round(100 * choice.reachability);
     const count = choice.members.length;
     made("h3", t(count === 1 ? "onePlace" : "places", { count, percent }), card);
-    made("p", t("travel", { metres: choice.cost.toFixed(1), seconds: Math.round(choice.cost / SPEED), speed: SPEED }), card);
+    if (number === 0) made("p", t(`recommended.${choice.basis}`), card, { class: "recommended" });
+    if (choice.fewer) made("p", gainOf(choice), card);
+    made("p", travelOf(choice.cost), card);
     const axes = choice.moves.map((axis) => named("settings", axis)).join(", ");
     made("p", axes ? t("moves", { axes }) : t("unmoved"), card);
     if (choice.success !== undefined) {
@@ -82,7 +102,7 @@ export function showCards(choices, onGo, onShow) {
       button.onclick = () => onGo(member);
       button.onfocus = () => onShow(choice);
     });
-  }
+  });
 }
 
 // The colours that the floors of a file can have: two always, the others where the file has them.
