@@ -47,6 +47,13 @@ def new(
             help="Links to leave out, separated by commas: nothing is checked against them.",
         ),
     ] = None,
+    packages: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Folder to search for packages that the URDF names; may be repeated.",
+        ),
+    ] = None,
     jobs: options.Jobs = 2,
     as_json: options.Json = False,
 ) -> None:
@@ -60,6 +67,7 @@ def new(
         coarse=coarse,
         collision_meshes=from_collision_meshes,
         ignore=tuple(link for links in ignore or () for link in links.split(",") if link),
+        packages=tuple(str(folder.absolute()) for folder in packages or ()),
         jobs=jobs,
     )
     with terminal.progress_bar("steps", lines=True) as on_progress:

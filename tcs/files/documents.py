@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
 
 import yaml
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from tcs.errors import DataFileError, UnknownNameError, one_line
 from tcs.files import quantities
-from tcs.files.quantities import Quantity
+from tcs.files.quantities import UNIT_TOLERANCE, Quantity
 from tcs.files.reading import read_text
 
 
@@ -54,19 +54,54 @@ class Document(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+QUATERNION = "quaternion_xyzw"
+"""Key of an orientation in the order of ROS."""
+
+
 class Placed(Document):
     """An entry with a pose in a frame that the entry or its context names."""
 
     xyz: tuple[Position, Position, Position] = (0.0, 0.0, 0.0)
     """Position of its origin in that frame [m]."""
     rpy_deg: tuple[AngleDeg, AngleDeg, AngleDeg] = (0.0, 0.0, 0.0)
-    """Roll, pitch, yaw about that frame's fixed axes [deg]."""
+    """Roll, pitch, yaw about that frame's fixed axes [deg]; files may give `quaternion_xyzw`."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _angles_of_quaternion(cls, content: Any) -> Any:
+        """Replace `quaternion_xyzw` by `rpy_deg`."""
+        if not isinstance(content, Mapping) or QUATERNION not in content:
+            return content
+        if "rpy_deg" in content:
+            raise ValueError(f"give rpy_deg or {QUATERNION}, not both")
+        numbers = content[QUATERNION]
+        given = isinstance(numbers, list | tuple) and len(numbers) == 4
+        if not given or not all(type(n) in (int, float) and math.isfinite(n) for n in numbers):
+            raise ValueError(f"{QUATERNION} must be four numbers: x, y, z, w")
+        length = math.hypot(*numbers)
+        if abs(length - 1.0) > UNIT_TOLERANCE:
+            raise ValueError(f"{QUATERNION} (x, y, z, w) has length {length:.6g}, but must have 1")
+        others = {key: value for key, value in content.items() if key != QUATERNION}
+        return {**others, "rpy_deg": _angles(*(n / length for n in numbers))}
 
     @property
     def rpy(self) -> tuple[float, float, float]:
         """Roll, pitch, yaw about that frame's fixed axes [rad]."""
         roll, pitch, yaw = (math.radians(angle) for angle in self.rpy_deg)
         return roll, pitch, yaw
+
+
+def _angles(x: float, y: float, z: float, w: float) -> tuple[float, float, float]:
+    """Return roll, pitch, yaw about fixed axes [deg] of a unit quaternion."""
+    level = math.hypot(1 - 2 * (y * y + z * z), 2 * (x * y + w * z))
+    pitch = math.atan2(2 * (w * y - z * x), level)
+    if level > 1e-9:
+        roll = math.atan2(2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
+        yaw = math.atan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z))
+    else:
+        # Straight up or down, roll and yaw turn about one axis.
+        roll, yaw = 0.0, math.atan2(2 * (w * z - x * y), 1 - 2 * (x * x + z * z))
+    return math.degrees(roll), math.degrees(pitch), math.degrees(yaw)
 
 
 DocumentT = TypeVar("DocumentT", bound=Document)

@@ -227,3 +227,6 @@ QUANTITIES = (
     AXIS_VALUES, VOLUME, GOALS, ENTRIES, PRIMITIVES,
 )  # fmt: skip
 """All quantities, in the order of the documentation."""
+
+UNIT_TOLERANCE = 1.1e-3
+"""Tolerance of the length of a quaternion: three printed digits change it by up to 0.001."""

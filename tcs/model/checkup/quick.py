@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tcs.files.paths import is_path
 from tcs.model.checkup.tool import fingers_off_axis, tool_axes_problem
-from tcs.model.robots import Primitive, load_robot
+from tcs.model.robots import load_robot
+from tcs.model.robots.tool_place import tool_place
 from tcs.model.robots.urdf.pose import pose_in_root
 
 SUNK = 0.1
@@ -20,7 +20,8 @@ protrude from it by up to 6 cm (Baxter's pedestal)."""
 def quick_problems(robot: str | Path) -> tuple[str, ...]:
     """Return problems of a robot file of one's own that a check-up would find, one sentence each.
 
-    Only those that need no mesh: the axes of the tool frame, and a root above the floor.
+    Only those that need no mesh: the axes of the tool frame and where it lies, and a root above the
+    floor.
 
     Args:
         robot: Name of a robot, for which nothing is checked, or path of its file.
@@ -36,24 +37,18 @@ def quick_problems(robot: str | Path) -> tuple[str, ...]:
     axis = fingers_off_axis(loaded)
     if axis is not None:
         found.append(tool_axes_problem(loaded, axis))
+    place = tool_place(loaded)
+    if place is not None and place.doubt:
+        found.append(place.doubt)
     model, positions = loaded.model(), loaded.with_mimics(loaded.joint_positions())
-    lowest = 0.0
+    lowest, arm = 0.0, model.links_moved_by(loaded.arm_joints[0])
     for shape in loaded.load_primitives():
-        if shape.body in model.links:
+        if shape.body in model.links and shape.body not in arm:
             R, p = pose_in_root(model, shape.body, positions)
-            lowest = min(lowest, float(p[2] + R[2] @ np.array(shape.xyz)) - _reach(shape, R[2]))
+            lowest = min(lowest, float(p[2] + R[2] @ np.array(shape.xyz)) - shape.reach(R[2]))
     if lowest < -SUNK:
         found.append(
             f"its primitives reach {-lowest:.2f} m below '{loaded.root_body}', but the root must "
             "be on the floor: add a mount."
         )
     return tuple(found)
-
-
-def _reach(shape: Primitive, direction: NDArray[np.float64]) -> float:
-    """Return how far a shape extends from its centre along a direction in its body [m]."""
-    along = np.abs(direction @ shape.rotation)
-    if shape.kind == "box":
-        return float(along @ np.array(shape.size)) / 2
-    length = shape.size[1] if shape.kind == "capsule" else 0.0
-    return float(along[2]) * length / 2 + shape.size[0]

@@ -12,8 +12,10 @@ import numpy as np
 from tcs.model.checkup.arm import ArmClass, RoundTrip, arm_class, round_trip
 from tcs.model.checkup.tool import fingers_off_axis, flange_note, tool_axes_problem
 from tcs.model.robots import RobotFile
+from tcs.model.robots.doubts import doubts
 from tcs.model.robots.fitting import BodyEnclosure, enclosure
 from tcs.model.robots.hand import hand_axes
+from tcs.model.robots.tool_place import ToolPlace, tool_place
 from tcs.model.robots.urdf.pose import pose_in_root
 from tcs.model.robots.urdf.surfaces import body_triangles
 from tcs.model.scene import EMPTY_ENVIRONMENT, Contact, Scene, SceneSpec, arm_chain
@@ -69,13 +71,15 @@ class RobotCheck:
         bodies: Enclosure of each body with a surface.
         rest: Rest posture of the arm, by joint [rad], in which self-collision was checked.
         margin: Distance below which bodies of the robot are in contact [m].
-        lowest: Height above the root of the lowest point of any surface, the arm at rest [m].
+        lowest: Height above the root of the lowest point of all surfaces but the arm's [m].
         contacts: Pairs that scoring checks and that are in contact at rest.
         trip: Result of the IK round trip.
         seed: Seed of the postures of the round trip.
         fingers_along: Axis of the tool frame along which the fingers point, None if it is x or
             there are none.
         flange: What to review in the tool frame of a hand without fingers, None if nothing.
+        place: Where the tool frame lies, seen from the hand; None if the hand has no shapes.
+        doubts: What is doubtful in the URDF and the choice of the arm, one sentence each.
     """
 
     robot: RobotFile
@@ -90,6 +94,8 @@ class RobotCheck:
     seed: int
     fingers_along: str | None = None
     flange: str | None = None
+    place: ToolPlace | None = None
+    doubts: tuple[str, ...] = ()
 
     @property
     def bodies_without_mesh(self) -> tuple[str, ...]:
@@ -142,7 +148,7 @@ class RobotCheck:
     @property
     def notes(self) -> tuple[str, ...]:
         """Remarks on properties that are not problems, one sentence each."""
-        found = []
+        found = list(self.doubts)
         if self.arm.solver is None and self.arm.joints == 7:
             found.append(f"{self.arm.reason} It is solved numerically, which takes longer.")
         if self.arm.joints == 5:
@@ -213,6 +219,7 @@ class RobotCheck:
             "excess_volume": {body.body: body.excess for body in self.bodies},
             "lowest_point_m": self.lowest,
             "fingers_along": self.fingers_along,
+            "hand_beyond_tool_m": None if self.place is None else self.place.beyond,
             "self_collision": {
                 "rest_rad": dict(self.rest),
                 "margin_m": self.margin,
@@ -257,6 +264,8 @@ def check_up(robot: RobotFile, *, samples: int = 1000, seed: int = 0) -> RobotCh
         seed=seed,
         fingers_along=fingers_off_axis(robot),
         flange=flange_note(robot, hand_axes(robot)),
+        place=tool_place(robot),
+        doubts=doubts(robot),
     )
 
 
@@ -270,9 +279,12 @@ def _limits(robot: RobotFile) -> tuple[JointLimits, ...]:
 
 
 def _lowest(robot: RobotFile, positions: Mapping[str, float]) -> float:
-    """Return the height above the root of the lowest point of any surface, at most 0 [m]."""
+    """Return the height above the root of the lowest point of all but the arm, at most 0 [m]."""
     model, lows = robot.model(), [0.0]
+    arm = model.links_moved_by(robot.arm_joints[0])
     for body, triangles in body_triangles(model).items():
+        if body in arm:
+            continue
         R, p = pose_in_root(model, body, positions)
         lows.append(float((triangles @ R[2] + p[2]).min()))
     return min(lows)

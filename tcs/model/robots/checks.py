@@ -144,8 +144,9 @@ def _check_coupled(robot: RobotFile, model: Urdf, where: str) -> None:
             mimic = joint.mimic
             if joint.type != "prismatic" or (mimic and (mimic.multiplier, mimic.offset) != (1, 0)):
                 raise RobotError(
-                    f"{at}: '{joint.name}' and '{leader}' are coupled, but only prismatic joints "
-                    "that move by the same distance can be."
+                    f"{at}: {', '.join(map(repr, names))} and '{leader}' of the arm are coupled, "
+                    "but only prismatic joints that move by the same distance can be. If "
+                    f"'{leader}' moves fingers, name a frame of the hand as tool frame."
                 )
 
 

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tcs.errors import RobotError, UnknownNameError
 from tcs.files.writing import scratch_folder
 from tcs.files.xml_documents import read_xml
 from tcs.model.robots.arm_joints import nearest_joints
 from tcs.model.robots.checks import check_robot
+from tcs.model.robots.doubts import doubts
 from tcs.model.robots.draft_frames import on_floor, standing_bodies, with_goal_axes
 from tcs.model.robots.fitting import fit_robot, tightened
 from tcs.model.robots.primitives import Primitive, write_primitives
@@ -30,6 +33,7 @@ from tcs.model.robots.self_collision import (
     free_posture,
     propose_disabled_pairs,
 )
+from tcs.model.robots.tool_place import tool_place
 from tcs.model.robots.urdf import Joint, Urdf, read_urdf
 from tcs.model.robots.urdf.packages import resolve_uri
 from tcs.model.robots.urdf.pose import pose_in_root
@@ -72,6 +76,7 @@ class DraftOptions:
         collision_meshes: Whether the collision geometry of a link, if there is any, is its whole
             surface.
         ignore: Links that nothing is checked against.
+        packages: Folders in which packages that the URDF names are searched for first.
         jobs: Number of processes that fit shapes, tighten them and compare pairs of bodies.
     """
 
@@ -79,6 +84,7 @@ class DraftOptions:
     coarse: bool = False
     collision_meshes: bool = False
     ignore: tuple[str, ...] = ()
+    packages: tuple[str, ...] = ()
     jobs: int = 1
 
 
@@ -98,9 +104,9 @@ def draft_robot(
 
     The arm consists of the joints nearest the tool that `nearest_joints` takes. The torso is a
     vertical prismatic joint between root and arm. Every other joint is at 0 if its range includes
-    values on both sides of 0, else in the middle of its range. `fit_robot` gives the primitives and
-    `propose_disabled_pairs` the pairs that need no check. If the hand does not point along x of the
-    tool, a frame with the axes that goals need is added.
+    0, else in the middle of its range, and so is a joint of the hand whose range ends at 0.
+    `fit_robot` gives the primitives and `propose_disabled_pairs` the pairs that need no check. If
+    the hand does not point along x of the tool, a frame with the axes that goals need is added.
 
     Args:
         urdf: Path of the URDF, or its `package://` address.
@@ -114,14 +120,15 @@ def draft_robot(
         RobotError: If the URDF or a mesh cannot be used, the base does not carry the tool, or no
             arm that is supported leads to it.
     """
-    path = Path(os.path.realpath(resolve_uri(str(urdf), Path())))
-    model = read_urdf(path)
+    path = Path(os.path.realpath(resolve_uri(str(urdf), Path(), options.packages)))
+    model = read_urdf(path, options.packages)
     arm, arm_base, torso = _arm(model, tool, options.base)
     for link in options.ignore:
         if link not in model.links:
             where = f"URDF '{path}', links to ignore"
             raise UnknownNameError("link", link, model.links, where=where)
     model = model.with_surfaces(collision_only=options.collision_meshes, ignored=options.ignore)
+    model.require_surfaces()
     if not body_triangles(model):
         raise RobotError(
             f"URDF '{path}': no link has a visual or collision geometry, so there is nothing to "
@@ -139,6 +146,7 @@ def draft_robot(
             urdf=address,
             surfaces="collision" if options.collision_meshes else "all",
             ignored_links=options.ignore,
+            packages=options.packages,
             root_body=model.root,
             arm_base=arm_base,
             arm_joints=tuple(joint.name for joint in arm),
@@ -165,6 +173,7 @@ def draft_robot(
         rest = free_posture(robot)
         robot = robot.model_copy(update={"rest": rest or {}})
         robot, axes = with_goal_axes(robot)
+        place, doubtful = tool_place(robot), doubts(robot)
         surfaces = carried_surfaces(robot)
         found = _blocked(robot, surfaces, steps)
         if not options.coarse and max(by.fraction for by in found) > _ALLOWED:
@@ -177,10 +186,9 @@ def draft_robot(
         blocked, at_boxes = found
     worst = max(fits, key=lambda found: found.fit.excess)
     remarks = [
-        f"arm: the {len(arm)} {_kinds(arm)}joints nearest '{tool}', from '{arm_base}' on: "
-        f"{', '.join(joint.name for joint in arm)}",
-        f"torso: {f'{torso.name!r}' if torso else 'no vertical prismatic joint below the arm'}",
-        f"tool: {axes}",
+        *(f"doubtful: {line}" for line in doubtful),
+        *_joint_remarks(model, robot, arm, tool),
+        f"tool: {axes}{'' if place is None else f'; {place.text}'}",
         *(
             []
             if rest is not None
@@ -191,8 +199,7 @@ def draft_robot(
         f"self-collision: {blocked.text()}",
         f"obstacles: {at_boxes.text()}",
         *_left_out(options),
-        "posture: 0 if the range of a joint includes both signs, else the middle of its range; "
-        "check that the gripper is open and a second arm out of the way",
+        "posture: check that the gripper is open and a second arm out of the way",
         f"root: {floor}",
     ]
     return Draft(robot=robot, primitives=primitives, remarks=tuple(remarks))
@@ -254,6 +261,26 @@ def _kinds(arm: list[Joint]) -> str:
     return "" if any(joint.type == "prismatic" for joint in arm) else "revolute "
 
 
+def _joint_remarks(model: Urdf, robot: RobotFile, arm: list[Joint], tool: str) -> list[str]:
+    """Return which joints are the arm and the torso, and at which values all others are left."""
+    positions = robot.joint_positions()
+    led = {j.name for j in model.joints.values() if j.mimic is not None}
+    by_value: dict[str, list[str]] = {}
+    for name, value in positions.items():
+        if name in model.joints and name not in led:
+            by_value.setdefault(f"{value:g}", []).append(name)
+    left = "; ".join(f"at {value}: {', '.join(names)}" for value, names in by_value.items())
+    locked = [f"{j.name} at {j.locked:g}" for j in model.joints.values() if j.locked is not None]
+    torso = robot.torso_joint
+    return [
+        f"arm: the {len(arm)} {_kinds(arm)}joints nearest '{tool}', from '{robot.arm_base}' on: "
+        f"{', '.join(joint.name for joint in arm)}",
+        f"torso: {f'{torso!r}' if torso else 'no vertical prismatic joint below the arm'}",
+        f"left as they are [rad or m]: {left or 'no other joint'}",
+        *([f"fixed, because their limits are one value: {', '.join(locked)}"] if locked else []),
+    ]
+
+
 def _left_out(options: DraftOptions) -> list[str]:
     """Return remarks on surfaces that the primitives need not enclose."""
     remarks = []
@@ -277,9 +304,28 @@ def _arm(model: Urdf, tool: str, base: str | None) -> tuple[list[Joint], str, Jo
         raise RobotError(f"{where}: base '{base}' does not carry tool frame '{tool}'.")
     movable = [joint for joint in chain if joint.is_movable]
     arm = nearest_joints(movable, f"{where}: from '{base or model.root}' to tool frame '{tool}'")
+    _check_slides(model, arm, where)
     exact = base is not None and movable == arm
     arm_base = str(base) if exact else arm[0].parent
     return arm, arm_base, _torso(model, arm[0].parent)
+
+
+def _check_slides(model: Urdf, arm: list[Joint], where: str) -> None:
+    """Refuse prismatic joints that follow each other along one direction, as in a telescope."""
+    for before, joint in itertools.pairwise(arm):
+        if before.type == joint.type == "prismatic":
+            first, second = (_axis_in_root(model, j) for j in (before, joint))
+            if abs(float(first @ second)) > _VERTICAL:
+                raise RobotError(
+                    f"{where}: '{before.name}' and '{joint.name}' slide along one direction, as "
+                    "the segments of a telescope do, and count as one freedom. Couple them with "
+                    "'mimic' in the URDF, and draft it again."
+                )
+
+
+def _axis_in_root(model: Urdf, joint: Joint) -> NDArray[np.float64]:
+    R, _ = pose_in_root(model, joint.child, {})
+    return np.asarray(R @ np.array(joint.axis) / np.linalg.norm(joint.axis))
 
 
 def _torso(model: Urdf, arm_base: str) -> Joint | None:
@@ -288,9 +334,7 @@ def _torso(model: Urdf, arm_base: str) -> Joint | None:
     for joint in model.chain(model.root, arm_base) or ():
         if joint.type != "prismatic" or joint.mimic is not None:
             continue
-        R, _ = pose_in_root(model, joint.child, {})
-        axis = R @ np.array(joint.axis) / np.linalg.norm(joint.axis)
-        if axis[2] > _VERTICAL:
+        if _axis_in_root(model, joint)[2] > _VERTICAL:
             vertical.append(joint)
     return max(vertical, key=lambda joint: joint.soft[1] - joint.soft[0], default=None)
 
@@ -307,8 +351,11 @@ def _positions(
         if not joint.is_movable or joint.mimic is not None or scored:
             continue
         lower, upper = joint.soft
-        value = 0.0 if lower < 0.0 < upper else round((lower + upper) / 2, 6)
-        (gripper if joint.child in held else posture)[joint.name] = value
+        of_hand = joint.child in held
+        # Zero is where the model was drawn. Fingers are often closed there, at the end of a range.
+        at_zero = lower < 0.0 < upper if of_hand else lower <= 0.0 <= upper
+        value = 0.0 if at_zero else round((lower + upper) / 2, 6)
+        (gripper if of_hand else posture)[joint.name] = value
     return posture, gripper
 
 

@@ -41,6 +41,11 @@ def write_draft(draft: Draft, path: Path) -> Path:
         content["urdf"] = Path(
             os.path.relpath(draft.robot.urdf, os.path.dirname(os.path.realpath(path)))
         ).as_posix()
+    if draft.robot.packages:
+        content["packages"] = [
+            Path(os.path.relpath(folder, os.path.dirname(os.path.realpath(path)))).as_posix()
+            for folder in draft.robot.packages
+        ]
     text = _HEADER.format(remarks="\n".join(f"# - {remark}" for remark in draft.remarks))
     text += yaml.safe_dump(
         content, sort_keys=False, width=95, default_flow_style=None, allow_unicode=True

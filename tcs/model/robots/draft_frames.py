@@ -3,28 +3,40 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from tcs.model.robots.hand import hand_axes
 from tcs.model.robots.robot_file import ExtraFrame, Mount, RobotFile
+from tcs.model.robots.urdf import Urdf
 from tcs.model.robots.urdf.pose import pose_in_root
 from tcs.model.robots.urdf.surfaces import body_triangles
 
 _ON_FLOOR = 0.02
 """Bodies that reach down to this height [m] stand on the floor."""
+_ABOVE = 0.1
+"""Height of the lowest surface above the root from which on the robot seems to hover [m]."""
 
 
 def on_floor(robot: RobotFile) -> tuple[RobotFile, str]:
     """Return a robot whose root is on the floor, and what was chosen.
 
-    A root above the lowest surface, such as the pelvis of a humanoid, gets a mount.
+    A root above the lowest surface, such as the pelvis of a humanoid, gets a mount. The arm does
+    not count: bolted down, it may reach below its base.
     """
     model, positions = robot.model(), robot.with_mimics(robot.joint_positions())
-    lowest = 0.0
+    arm, lows = model.links_moved_by(robot.arm_joints[0]), [(0.0, model.root)]
     for body, triangles in body_triangles(model).items():
+        if body in arm:
+            continue
         R, p = pose_in_root(model, body, positions)
-        lowest = min(lowest, float((triangles @ R[2] + p[2]).min()))
+        lows.append((float((triangles @ R[2] + p[2]).min()), body))
+    lowest, lowest_body = min(lows[1:] or lows)
     if lowest >= -_ON_FLOOR:
-        return robot, f"'{model.root}' must be on the floor, z up, x forward"
+        above = f"; its lowest surface, of '{lowest_body}', is {lowest:g} m above it"
+        return robot, (
+            f"'{model.root}' must be on the floor, z up, x forward"
+            f"{above if lowest > _ABOVE else ''}"
+        )
     link = "floor_link"
     while link in model.links:
         link += "_"
@@ -34,9 +46,17 @@ def on_floor(robot: RobotFile) -> tuple[RobotFile, str]:
     mounted = robot.model_copy(update=change)
     return (
         mounted.model_copy(update={"standing_bodies": standing_bodies(mounted)}),
-        f"'{model.root}' is {height:g} m above the lowest surface: '{link}' on the floor carries "
-        "it; z must be up, x forward",
+        f"'{model.root}' is {height:g} m above the lowest surface, that of '{lowest_body}'"
+        f"{_moved_there(model, positions, lowest_body)}: '{link}' on the floor carries it; z must "
+        "be up, x forward",
     )
+
+
+def _moved_there(model: Urdf, positions: Mapping[str, float], body: str) -> str:
+    """Return which joints carry a body, and at which values, empty if none does."""
+    chain = [j.name for j in model.chain(model.root, body) or () if j.is_movable]
+    at = [f"{name} at {positions[name]:.3g}" for name in chain if positions[name]]
+    return f" with {', '.join(at)}" if at else f" with {', '.join(chain)} at 0" if chain else ""
 
 
 def with_goal_axes(robot: RobotFile) -> tuple[RobotFile, str]:

@@ -31,8 +31,7 @@ class HandAxes:
         forward: Direction in which it points, shape (3,), of length 1.
         opening: Direction in which its fingers open, shape (3,), of length 1; None if fewer than
             two fingers move.
-        fingers: Whether there are fingers; if not, `forward` is that from the last link to the
-            tool frame.
+        fingers: Whether there are fingers.
     """
 
     forward: FloatArray
@@ -77,7 +76,8 @@ def hand_axes(robot: RobotFile) -> HandAxes | None:
 
     Fingers are what joints beyond the arm move. Their direction is that of the centre of their
     primitives, seen from the last joint of the arm. Without fingers it is that from the centre of
-    the last link's primitives to the tool frame.
+    the last link's primitives to the tool frame, or, where the tool frame lies behind them, that of
+    the centre, seen from the last joint.
 
     Args:
         robot: The robot, at rest.
@@ -92,15 +92,16 @@ def hand_axes(robot: RobotFile) -> HandAxes | None:
     fingers = _fingers(model, robot.arm_joints[-1])
     centres = [_centre(robot, model, finger, positions) for finger in fingers]
     found = [centre for centre in centres if centre is not None]
+    _, start = pose_in_root(model, last, positions)
     if found:
-        _, start = pose_in_root(model, last, positions)
         ahead = np.mean(found, axis=0) - start
         opening = _widest(np.array(found), ahead)
     else:
         hand = _centre(robot, model, model.links_moved_by(robot.arm_joints[-1]), positions)
         if hand is None:
             return None
-        ahead, opening = p_T - hand, None
+        is_behind = np.linalg.norm(p_T - start) < np.linalg.norm(hand - start)
+        ahead, opening = hand - start if is_behind else p_T - hand, None
     length = float(np.linalg.norm(ahead))
     if length < _SHORTEST:
         return None

@@ -57,6 +57,15 @@ def _content(path: Path, based_on_it: tuple[Path, ...] = ()) -> dict[str, Any]:
         if isinstance(value, str) and not value.startswith("package://"):
             own = expanded(value, f"{where}, field '{key}'", RobotError)
             content[key] = os.path.realpath(file.parent / own)
+    if isinstance(content.get("packages"), list):
+        content["packages"] = [
+            os.path.realpath(
+                file.parent / expanded(folder, f"{where}, field 'packages'", RobotError)
+            )
+            if isinstance(folder, str)
+            else folder
+            for folder in content["packages"]
+        ]
     if isinstance(content.get("arms"), dict):
         content["arms"] = {
             arm: os.path.realpath(file.parent / name)

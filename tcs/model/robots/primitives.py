@@ -102,6 +102,18 @@ class Primitive:
             reach = np.abs(R_BP[:, 2]) * half_length + self.size[0]
         return np.asarray(np.array(self.xyz) + np.array([-reach, reach]))
 
+    def reach(self, direction: FloatArray) -> float:
+        """Return how far the primitive extends from its centre along a direction [m].
+
+        Args:
+            direction: Of length 1, in the body's axes, shape (3,).
+        """
+        along = np.abs(direction @ self.rotation)
+        if self.kind == "box":
+            return float(along @ np.array(self.size)) / 2
+        length = self.size[1] if self.kind == "capsule" else 0.0
+        return float(along[2]) * length / 2 + self.size[0]
+
     def contains(self, p_BoQ_B: FloatArray, *, tolerance: float = 0.0) -> BoolArray:
         """Return which points of the body lie in the primitive.
 

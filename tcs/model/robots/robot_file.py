@@ -104,6 +104,8 @@ class RobotFile(Document):
     them. Empty for a robot with one arm."""
     urdf: str
     """A `package://` address or a path."""
+    packages: tuple[Name, ...] = ()
+    """Folders in which packages that the URDF names are searched for first."""
     mount: Mount | None = None
     """The link that carries the root link of a URDF that starts above the floor; None if it is on
     the floor."""
@@ -252,7 +254,7 @@ class RobotFile(Document):
         Raises:
             RobotError: If there is no such file.
         """
-        return resolve_uri(self.urdf, Path())
+        return resolve_uri(self.urdf, Path(), self.packages)
 
     def model(self) -> Urdf:
         """Return the content of the URDF, on its mount, with the surfaces that count.
@@ -262,7 +264,10 @@ class RobotFile(Document):
         """
         collision_only = self.surfaces == "collision"
         coupled = tuple(self.coupled.items())
-        return _model(self.urdf_path(), self.mount, collision_only, self.ignored_links, coupled)
+        folders = self.packages
+        return _model(
+            self.urdf_path(), folders, self.mount, collision_only, self.ignored_links, coupled
+        )
 
     def joint_limits(self) -> dict[str, tuple[float, float]]:
         """Return the limits in force of every movable joint [rad or m]; infinite if continuous.
@@ -369,6 +374,7 @@ class RobotFile(Document):
 @kept_while_unchanged(files=64)
 def _model(
     path: Path,
+    folders: tuple[str, ...],
     mount: Mount | None,
     collision_only: bool,
     ignored: tuple[str, ...],
@@ -380,7 +386,7 @@ def _model(
         RobotError: If the URDF cannot be used, or the name of the mount is taken.
         UnknownNameError: If a coupled joint is unknown.
     """
-    model = read_urdf(path)
+    model = read_urdf(path, folders)
     for name, leader in coupled:
         model.joint(leader, "field 'coupled'")
         follower = model.joint(name, "field 'coupled'")
@@ -388,6 +394,7 @@ def _model(
         model = Urdf(path=path, links=model.links, joints={**model.joints, name: joint})
     if collision_only or ignored:
         model = model.with_surfaces(collision_only=collision_only, ignored=ignored)
+    model.require_surfaces()
     if mount is None:
         return model
     if mount.link in (*model.links, WORLD):

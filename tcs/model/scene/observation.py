@@ -12,7 +12,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.tree import Frame
 
 from tcs.errors import SelectionError, UnknownNameError
-from tcs.files.quantities import POSITION
+from tcs.files.quantities import POSITION, UNIT_TOLERANCE
 from tcs.kernel.arrays import FloatArray
 from tcs.model.scene.scene import Scene
 
@@ -221,8 +221,7 @@ def _pose(name: str, at: Sequence[float]) -> tuple[FloatArray, RotationMatrix | 
     if numbers.size == 3:
         return numbers, None
     length = float(np.linalg.norm(numbers[3:]))
-    # Trackers report four digits or more.
-    if abs(length - 1.0) > 1e-3:
+    if abs(length - 1.0) > UNIT_TOLERANCE:
         raise SelectionError(
             f"Observed frame '{name}': its quaternion (qw qx qy qz) has length {length:.4f}; "
             "must be 1."

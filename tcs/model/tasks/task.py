@@ -10,14 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import TaskError, UnknownNameError
-from tcs.files.quantities import GOALS, SIZE, WEIGHT
+from tcs.files.quantities import GOALS, SIZE, UNIT_TOLERANCE, WEIGHT
 from tcs.model.tasks.freedom import Freedom
 from tcs.model.tasks.hand import Hand, hands
 from tcs.model.tasks.surface import Surface
 from tcs.model.tasks.tool_line import (
     DEFAULT_APPROACH,
     DEFAULT_RETREAT,
-    UNIT_TOLERANCE,
     ToolLine,
     finite,
 )

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from tcs.errors import TaskError
 
-UNIT_TOLERANCE = 1e-5
-"""Tolerance of a quaternion's length: six printed digits round by less than this."""
+_SHORTEST = 1e-5
+"""Least length of a vector that is a direction."""
 MAX_STRAIGHT = 1.0
 """Greatest length of a straight tool motion [m]: about the reach of an arm."""
 
@@ -46,7 +46,7 @@ class ToolLine:
         """
         direction = finite("direction", self.direction, ("x", "y", "z"))
         length = math.hypot(*direction)
-        if length < UNIT_TOLERANCE:
+        if length < _SHORTEST:
             raise TaskError("field 'direction' has length 0. Name a direction in the tool frame.")
         if not 0.0 < self.distance <= MAX_STRAIGHT:
             raise TaskError(

@@ -38,6 +38,10 @@ def report_check(found: dict[str, Any]) -> None:
     largest = sorted(found["excess_volume"].items(), key=lambda item: -item[1])
     for body, excess in largest[:5]:
         echo(f"  {body:<28} {excess:.2f}")
+    if found["hand_beyond_tool_m"] is not None:
+        beyond = found["hand_beyond_tool_m"]
+        side = "beyond" if beyond >= 0.0 else "behind"
+        echo(f"tool frame       the hand ends {abs(beyond):.3f} m {side} it")
     margin = f"{contact['margin_m'] * 1e3:g} mm"
     echo(f"self-collision   {len(contact['pairs'])} pairs closer than {margin}")
     recovered = "tool poses solved" if arm["class"] is None else "postures recovered"

@@ -22,7 +22,7 @@ def test_robots_that_ship_have_none(name):
 
 def test_fingers_that_point_along_z_are_found(tmp_path):
     (tmp_path / "mine.yaml").write_text(PRO)
-    (problem,) = quick_problems(tmp_path / "mine.yaml")
+    problem, _ = quick_problems(tmp_path / "mine.yaml")
     assert "point along +z of tool frame 'gripper_left_base_link'" in problem
 
 

@@ -4,6 +4,7 @@ import pytest
 import trimesh
 
 from tcs.errors import OutputError, RobotError, UnknownNameError
+from tcs.model.checkup.quick import quick_problems
 from tcs.model.checkup.tool import fingers_off_axis
 from tcs.model.robots import load_robot
 from tcs.model.robots.draft import DraftOptions, draft_robot
@@ -15,7 +16,7 @@ from tcs.model.robots.fitting.enclosure import enclosure
 from tcs.model.robots.primitives import enclosed
 from tcs.model.robots.self_collision import SelfCollision, sample_positions
 from tcs.model.robots.urdf.surfaces import body_triangles
-from tests.model.robots.made_up import urdf
+from tests.model.robots.made_up import gantry, joint, link, urdf
 
 
 @pytest.fixture
@@ -48,6 +49,131 @@ def test_other_joints_are_at_zero_or_mid_range(drafted):
     robot = drafted[0].robot
     assert robot.postures == {"drafted": {"pan": 0.0, "nod": 0.5}}
     assert robot.grippers == {"drafted": {"grip": 0.02}}
+
+
+@pytest.fixture(scope="module")
+def doubtful(tmp_path_factory):
+    """Return a draft of a robot with much to review, and its file."""
+    folder = tmp_path_factory.mktemp("doubtful")
+    text = urdf()
+    # A cover that slides from 0 to half a metre below the floor.
+    cover = link("cover", ((0.3, 0.3, 0.2), (0, 0, 0.2)))
+    slide = joint("slide", "prismatic", "mast", "cover", axis="0 0 -1", limits=(0.0, 1.2))
+    # Degrees where radians belong.
+    text = text.replace('lower="-1.0" upper="1.0"', 'lower="-126" upper="126"')
+    # A sensor that cannot turn, between wrist and tool, and a tool frame in the palm.
+    text = text.replace(
+        '<parent link="arm7"/><child link="tool"/>', '<parent link="sensor"/><child link="tool"/>'
+    ).replace("0 0 0.2", "0 0 0.02")
+    sensor = joint("bolt", "revolute", "arm7", "sensor", (0, 0, 0.05), limits=(0, 0))
+    (folder / "odd.urdf").write_text(
+        text.replace("</robot>", f"{cover}{slide}{link('sensor')}{sensor}</robot>")
+    )
+    draft = draft_robot(folder / "odd.urdf", "tool", DraftOptions(coarse=True))
+    write_draft(draft, folder / "odd.yaml")
+    return draft, folder / "odd.yaml"
+
+
+def test_joints_that_can_be_at_zero_are_there(doubtful):
+    """Zero is where the model was drawn: the cover would be below the floor at mid-range."""
+    robot = doubtful[0].robot
+    assert robot.postures["drafted"]["slide"] == 0.0
+    assert robot.mount is None
+    assert robot.grippers == {"drafted": {"grip": 0.02}}
+
+
+def test_a_joint_that_cannot_move_is_no_joint_of_the_arm(doubtful):
+    robot = load_robot(doubtful[1])
+    assert robot.arm_joints == tuple(f"a{i}" for i in range(1, 8))
+    assert "fixed, because their limits are one value: bolt at 0" in doubtful[0].remarks
+
+
+def test_a_draft_says_which_joints_it_leaves_and_where(doubtful):
+    expected = "left as they are [rad or m]: at 0: pan, slide; at 0.5: nod; at 0.02: grip"
+    assert expected in doubtful[0].remarks
+
+
+def test_limits_in_degrees_are_named(doubtful):
+    (line,) = [r for r in doubtful[0].remarks if r.startswith("doubtful: limits")]
+    assert "'pan' [-126, 126]" in line
+    assert "degrees" in line
+
+
+def test_a_tool_frame_behind_the_fingertips_is_named(doubtful):
+    """The finger ends at 0.185 m, the tool frame is at 0.07 m."""
+    draft, file = doubtful
+    assert any("('finger') reaches 0.115 m beyond 'tool'" in r for r in draft.remarks)
+    assert any(r.startswith("doubtful: the hand ('finger')") for r in draft.remarks)
+    (problem,) = quick_problems(file)
+    assert "reaches 0.115 m beyond" in problem
+
+
+def test_a_tool_frame_at_the_fingertips_is_not_doubtful(drafted):
+    assert not any(r.startswith("doubtful") for r in drafted[0].remarks)
+    assert any("'tool' lies 0.015 m ahead of the hand" in r for r in drafted[0].remarks)
+
+
+def test_a_finger_as_tool_is_named(tmp_path):
+    """Arms of six joints with fingers that turn: the tool moves with one of them."""
+    turning = urdf(joints=6).replace('name="grip" type="prismatic"', 'name="grip" type="revolute"')
+    other = joint("grip2", "revolute", "arm6", "thumb", (0, -0.02, 0.145), limits=(0.0, 0.5))
+    file = tmp_path / "fingers.urdf"
+    file.write_text(turning.replace("</robot>", f"{link('thumb')}{other}</robot>"))
+    draft = draft_robot(file, "finger", DraftOptions(coarse=True))
+    assert draft.robot.arm_joints[-1] == "grip"
+    assert any("'grip' of 'finger', is a finger by its name" in r for r in draft.remarks)
+    (line,) = [r for r in draft.remarks if "if 'grip' is a finger" in r]
+    assert "'arm6' carries 'grip2' beside 'grip'" in line
+
+
+def test_a_frame_behind_a_fixed_gripper_points_out_of_it(tmp_path):
+    """Before, x pointed from the gripper back to the frame at the wrist."""
+    text = urdf().replace('name="grip" type="prismatic"', 'name="grip" type="fixed"')
+    file = tmp_path / "fixed.urdf"
+    file.write_text(text.replace("0 0 0.2", "0 0 0.02"))
+    draft = draft_robot(file, "tool", DraftOptions(coarse=True))
+    assert draft.robot.frames == ()
+    assert any("the last link points along +x of 'tool'" in r for r in draft.remarks)
+    assert any(r.startswith("doubtful: the hand") for r in draft.remarks)
+
+
+def test_segments_of_a_telescope_that_are_not_coupled_are_refused(tmp_path):
+    """Before, slides along one direction counted as a freedom each."""
+    file = tmp_path / "telescope.urdf"
+    file.write_text(gantry(telescope=False).replace('xyz="0 0 1"', 'xyz="1 0 0"'))
+    message = "'j1' and 'j2' slide along one direction.*Couple them with 'mimic'"
+    with pytest.raises(RobotError, match=message):
+        draft_robot(file, "tool")
+
+
+def test_the_arm_does_not_decide_where_the_floor_is(drafted, tmp_path):
+    """At zero, an arm that is bolted down may reach below its base."""
+    file = tmp_path / "low.urdf"
+    wrist = '<origin xyz="0 0 0.12"/><geometry><box size="0.06 0.06 0.05"/>'
+    assert wrist in urdf()
+    file.write_text(urdf().replace(wrist, wrist.replace("0 0 0.12", "0 0 -2")))
+    robot = drafted[0].robot.model_copy(update={"urdf": str(file)})
+    assert on_floor(robot)[0] == robot
+
+
+def test_the_file_keeps_the_folders_of_packages(tmp_path):
+    trimesh.creation.box([0.1, 0.1, 0.1]).export(tmp_path / "box.stl")
+    (tmp_path / "ws" / "meshes").mkdir(parents=True)
+    (tmp_path / "box.stl").rename(tmp_path / "ws" / "meshes" / "box.stl")
+    file = tmp_path / "urdf" / "arm.urdf"
+    file.parent.mkdir()
+    mesh = '<mesh filename="package://meshes/box.stl"/>'
+    file.write_text(urdf().replace('<box size="0.1 0.1 0.1"/>', mesh, 1))
+    options = DraftOptions(coarse=True, packages=(str(tmp_path / "ws"),))
+    draft = draft_robot(file, "tool", options)
+    (tmp_path / "mine").mkdir()
+    write_draft(draft, tmp_path / "mine" / "arm.yaml")
+    assert "packages: [../ws]" in (tmp_path / "mine" / "arm.yaml").read_text()
+    moved = tmp_path / "moved"
+    moved.mkdir()
+    for part in ("mine", "urdf", "ws"):
+        (tmp_path / part).rename(moved / part)
+    assert load_robot(moved / "mine" / "arm.yaml").model().links.keys() >= {"arm1", "tool"}
 
 
 def test_a_rest_posture_is_found_where_zero_collides(tmp_path):
@@ -248,7 +374,7 @@ def test_missing_meshes_are_named(tmp_path):
     )
     file = tmp_path / "no_mesh.urdf"
     file.write_text(text)
-    with pytest.raises(RobotError, match="package 'gone' is neither installed nor a folder above"):
+    with pytest.raises(RobotError, match="package 'gone' is neither installed, nor in ROS"):
         draft_robot(file, "tool")
 
 

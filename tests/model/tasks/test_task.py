@@ -31,6 +31,12 @@ def task(**changes: object) -> Task:
     return Task(**{**values, **changes})
 
 
+def test_three_digits_of_a_quaternion_suffice():
+    """0.707 twice has the length 0.99985."""
+    found = goal(quaternion=[0.707, 0.0, 0.0, 0.707]).quaternion
+    np.testing.assert_allclose(found, [HALF, 0.0, 0.0, HALF], atol=1e-12)
+
+
 def test_quaternion_is_normalised():
     # An error of 7e-6 of the length, as from numbers of six digits.
     written = np.array([0.5, 0.5, 0.5, 0.5]) * (1 + 7e-6)
@@ -78,7 +84,7 @@ def test_tasks_can_be_pickled():
         ({"position": [133.7, 1.8, -109.8]}, "Write metres"),
         ({"quaternion": [1, 0, 0]}, "must be 4 finite numbers (w, x, y, z)"),
         ({"quaternion": [math.inf, 0, 0, 0]}, "must be 4 finite numbers"),
-        ({"quaternion": [1, 0, 0, 0.01]}, "has length 1.00005, but must be a unit quaternion"),
+        ({"quaternion": [1, 0, 0, 0.06]}, "has length 1.0018, but must be a unit quaternion"),
         ({"quaternion": [0, 0, 0, 0]}, "has length 0, but must be a unit quaternion"),
         ({"weight": 0}, "field 'weight' is 0, but a weight must be 1e-06 to 1,000,000"),
         ({"weight": -1.0}, "field 'weight' is -1, but a weight must be"),

@@ -22,7 +22,10 @@ def kinematic_urdf(urdf: str | Path, meshes: bool = False) -> str:
     Raises:
         RobotError: If the URDF or one of its meshes cannot be used.
     """
-    return urdf_text(read_urdf(resolve_uri(str(urdf), Path())), meshes)
+    model = read_urdf(resolve_uri(str(urdf), Path()))
+    if meshes:
+        model.require_surfaces()
+    return urdf_text(model, meshes)
 
 
 def urdf_text(model: Urdf, meshes: bool = False) -> str:
@@ -43,7 +46,8 @@ def urdf_text(model: Urdf, meshes: bool = False) -> str:
         link = ElementTree.SubElement(root, "link", name=name)
         if meshes:
             for geometry in geometries:
-                if geometry.role == "visual":
+                # A mesh that is only drawn may be missing; surfaces were checked.
+                if geometry.role == "visual" and not geometry.fault:
                     _add_visual(link, geometry)
     for joint in model.joints.values():
         _add_joint(root, joint)

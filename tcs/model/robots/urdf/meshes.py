@@ -31,7 +31,7 @@ MAX_TRIANGLES = 5_000_000
 MAX_COORDINATE = SIZE.high * 1e4
 """Greatest coordinate in the unit of a mesh: the greatest size in tenths of a millimetre."""
 
-_VERSION = b"2"
+_VERSION = b"3"
 """Part of the cache key: increase it when the conversion changes."""
 
 
@@ -62,7 +62,9 @@ def as_obj(mesh: Path) -> Path:
 
 @kept_while_unchanged(files=256)
 def mesh_triangles(mesh: Path) -> FloatArray:
-    """Return the corners of every triangle of a mesh [unit of the mesh], shape (n, 3, 3).
+    """Return the corners of every triangle of a mesh, shape (n, 3, 3).
+
+    Those of Collada files, which name their unit, are in metres, others in the unit of the mesh.
 
     Triangles without area are kept, because the primitives must enclose them as well.
 
@@ -92,10 +94,12 @@ def _load(mesh: Path) -> trimesh.Trimesh:
     content = _content(mesh)
     file: Path | io.BytesIO = mesh
     options: dict[str, Any] = {}
+    unit = 1.0
     try:
         if mesh.suffix.lower() == ".dae":
             # Faults of geometry are raised, not passed over with what they concern.
-            file = io.BytesIO(geometry_only(content))
+            geometry, unit = geometry_only(content)
+            file = io.BytesIO(geometry)
             options = {"file_type": "dae", "ignore_broken": False}
         loaded = trimesh.load(file, force="mesh", process=False, **options)
     except MemoryError:
@@ -106,6 +110,8 @@ def _load(mesh: Path) -> trimesh.Trimesh:
     if not isinstance(loaded, trimesh.Trimesh) or len(loaded.faces) == 0:
         raise RobotError(f"mesh '{mesh}' contains no triangles.")
     _check(mesh, loaded)
+    if unit != 1.0:
+        loaded.vertices = np.asarray(loaded.vertices) * unit
     return loaded
 
 

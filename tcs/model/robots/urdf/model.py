@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
-from tcs.errors import UnknownNameError
+from tcs.errors import RobotError, UnknownNameError
 
 Vector = tuple[float, float, float]
 
@@ -50,6 +50,9 @@ class Joint:
     mimic: Mimic | None
     velocity: float = math.inf
     """Speed limit of the `limit` element [m/s or rad/s]; infinite if there is none."""
+    locked: float | None = None
+    """Position at which a joint is fixed that the URDF calls movable, but whose limits are one
+    value [rad or m]; None for all others. The origin includes it."""
 
     @property
     def is_movable(self) -> bool:
@@ -87,6 +90,8 @@ class Geometry:
     rpy: Vector
     """Roll, pitch, yaw about the link's fixed axes [rad]."""
     rgba: tuple[float, float, float, float] | None
+    fault: str = ""
+    """Why there is no mesh at `mesh`, "" if it was found."""
     is_surface: bool = True
     """Whether it is part of the surface that may touch; if not, it is only drawn."""
 
@@ -145,6 +150,17 @@ class Urdf:
             for link, geometries in self.links.items()
         }
         return Urdf(path=self.path, links=links, joints=self.joints)
+
+    def require_surfaces(self) -> None:
+        """Refuse surfaces whose mesh was not found; one that is only drawn may be missing.
+
+        Raises:
+            RobotError: If there is one.
+        """
+        for geometries in self.links.values():
+            for geometry in geometries:
+                if geometry.is_surface and geometry.fault:
+                    raise RobotError(geometry.fault)
 
     def joint(self, name: str, where: str) -> Joint:
         """Return a joint by name.

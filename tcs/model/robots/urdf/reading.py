@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
 
 from tcs.errors import RobotError, UnknownNameError
 from tcs.files.quantities import ANGLE, ENTRIES, EXTENT, JOINT_LIMIT, MESH_SCALE, POSITION
@@ -24,49 +28,123 @@ WORLD = "world"
 ROOT = "root_link"
 """Name under which a root link called `world` is read, as in URDFs of arms to be bolted down."""
 
-_XACRO = "{http://www.ros.org/wiki/xacro}"
-"""XML namespace of the macros from which a URDF is generated."""
+_XACRO = re.compile(r"^xacro:|\{[^}]*xacro[^}]*\}|\$\{|\$\(")
+"""What is left of macros from which a URDF is generated: a name in one of their XML namespaces
+(`http://www.ros.org/wiki/xacro`, `http://ros.org/wiki/xacro`), or a substitution."""
 
 
-@kept_while_unchanged(files=64)
-def read_urdf(path: Path) -> Urdf:
+def read_urdf(path: Path, folders: tuple[str, ...] = ()) -> Urdf:
     """Return the links and joints of a URDF file.
+
+    A joint whose limits are one value is fixed there, and so are those that mimic it. A capsule
+    becomes a cylinder and two spheres. A mesh that is not found keeps the reason as its `fault`.
 
     Args:
         path: The file; read anew only if it has changed.
+        folders: Folders that packages are searched in first.
 
     Raises:
-        RobotError: If the file cannot be read, is not a URDF, names a missing mesh, or its joints
-            do not form one tree.
+        RobotError: If the file cannot be read, is not a URDF, or its joints do not form one tree.
     """
+    model = _kept(path, folders)
+    # What was missing may have come since.
+    missing = any(g.fault for geometries in model.links.values() for g in geometries)
+    return _read(path, folders) if missing else model
+
+
+def _read(path: Path, folders: tuple[str, ...]) -> Urdf:
+    """Return the links and joints of a URDF file; see `read_urdf`."""
     root = read_xml(path, f"URDF '{path}'", RobotError)
     if root.tag != "robot":
         raise RobotError(f"URDF '{path}': the root element is '{root.tag}', but must be 'robot'.")
-    if any(element.tag.startswith(_XACRO) for element in root.iter()):
+    if any(_has_macro(element) for element in root.iter()):
         raise RobotError(
-            f"URDF '{path}' has xacro macros. Expand them first: xacro {path.name} > robot.urdf"
+            f"URDF '{path}' has xacro macros. Expand it with xacro first: xacro {path.name} > "
+            "robot.urdf"
         )
     colours = {
         element.get("name", ""): colour
         for element in root.findall("material")
-        if (colour := _colour(element, path)) is not None
+        if (colour := _colour(element)) is not None
     }
-
-    def geometry(element: ElementTree.Element) -> Geometry | None:
-        return _geometry(element, colours, path)
 
     for tag in ("link", "joint"):
         ENTRIES.check(len(root.findall(tag)), f"URDF '{path}': its number of {tag}s", RobotError)
+        _check_distinct(root, tag, path)
     links: dict[str, tuple[Geometry, ...]] = {}
     for link in root.findall("link"):
+        name = _attribute(link, "name", path)
         elements = (*link.findall("visual"), *link.findall("collision"))
-        links[_attribute(link, "name", path)] = tuple(
-            found for element in elements if (found := geometry(element)) is not None
+        links[name] = tuple(
+            geometry
+            for element in elements
+            for geometry in _geometries(element, colours, path, name, folders)
         )
     joints = {j.name: j for j in (_joint(element, path) for element in root.findall("joint"))}
     model = _without_world(Urdf(path=path, links=links, joints=joints))
     _check_tree(model)
-    return model
+    return _without_locked(model)
+
+
+_kept = kept_while_unchanged(files=64)(_read)
+
+
+def _has_macro(element: ElementTree.Element) -> bool:
+    """Return whether an element, or an attribute of it, is what a macro leaves to be expanded."""
+    return any(_XACRO.search(text) for text in (element.tag, *element.attrib.values()))
+
+
+def _check_distinct(root: ElementTree.Element, tag: str, path: Path) -> None:
+    """Refuse two links, or two joints, of one name: the first would be lost."""
+    seen = set()
+    for element in root.findall(tag):
+        name = _attribute(element, "name", path)
+        if name in seen:
+            raise RobotError(f"URDF '{path}': two {tag}s are named '{name}'. Rename one.")
+        seen.add(name)
+
+
+def _without_locked(model: Urdf) -> Urdf:
+    """Return the model with joints fixed whose limits are one value, and those that mimic them."""
+    locked = {j.name: j.hard[0] for j in model.joints.values() if _is_locked(j)}
+    if not locked:
+        return model
+
+    def position(joint: Joint) -> float | None:
+        """Return the one position of a joint [rad or m], None if it moves."""
+        if joint.mimic is None:
+            return locked.get(joint.name)
+        led = position(model.joints[joint.mimic.leader])
+        return None if led is None else joint.mimic.multiplier * led + joint.mimic.offset
+
+    joints = {
+        name: joint if (at := position(joint)) is None else _fixed_at(joint, at)
+        for name, joint in model.joints.items()
+    }
+    return Urdf(path=model.path, links=model.links, joints=joints)
+
+
+def _is_locked(joint: Joint) -> bool:
+    return joint.is_movable and joint.hard[0] == joint.hard[1] and joint.mimic is None
+
+
+def _fixed_at(joint: Joint, position: float) -> Joint:
+    """Return a joint that is fixed at a position [rad or m]."""
+    xyz, rpy = joint.xyz, joint.rpy
+    if position:
+        R = Rotation.from_euler("xyz", rpy)
+        axis = np.array(joint.axis) / math.hypot(*joint.axis)
+        if joint.type == "prismatic":
+            x, y, z = (np.array(xyz) + R.apply(axis * position)).tolist()
+            xyz = (x, y, z)
+        else:
+            turned = R * Rotation.from_rotvec(axis * position)
+            roll, pitch, yaw = turned.as_euler("xyz", suppress_warnings=True).tolist()
+            rpy = (roll, pitch, yaw)
+    return replace(
+        joint, type="fixed", xyz=xyz, rpy=rpy, hard=(0.0, 0.0), soft=(0.0, 0.0), mimic=None,
+        locked=position,
+    )  # fmt: skip
 
 
 def _without_world(model: Urdf) -> Urdf:
@@ -135,7 +213,8 @@ def _joint(element: ElementTree.Element, path: Path) -> Joint:
     joint_type = element.get("type", "")
     if joint_type not in (*MOVABLE, "fixed"):
         raise RobotError(
-            f"{where}: type '{joint_type}' is not supported, only {', '.join(MOVABLE)} and fixed."
+            f"{where}: type '{joint_type}' is not supported, only {', '.join(MOVABLE)} and fixed. "
+            "Make one that stands for the drive of the base 'fixed': scoring moves the base itself."
         )
     ends = {}
     for end in ("parent", "child"):
@@ -226,51 +305,80 @@ def _mimic(element: ElementTree.Element, where: str) -> Mimic | None:
     return Mimic(leader=mimic.get("joint", ""), multiplier=multiplier, offset=offset)
 
 
-def _geometry(
-    element: ElementTree.Element, colours: Mapping[str, tuple[float, ...]], path: Path
-) -> Geometry | None:
-    where = f"URDF '{path}'"
+def _geometries(
+    element: ElementTree.Element,
+    colours: Mapping[str, tuple[float, ...]],
+    path: Path,
+    link: str,
+    folders: tuple[str, ...],
+) -> tuple[Geometry, ...]:
+    """Return the geometries of a visual or collision element: three for a capsule."""
+    where = f"URDF '{path}', link '{link}'"
     holder = element.find("geometry")
     if holder is None or len(holder) == 0:
-        return None
+        return ()
     shape = holder[0]
+    # Drake's own shapes have its namespace, or a prefix that is not declared.
+    kind = re.split("[}:]", shape.tag)[-1]
     mesh: Path | None = None
-    if shape.tag == "mesh":
+    fault = ""
+    if kind == "mesh":
         size: tuple[float, ...] = _vector(shape, "scale", (1.0, 1.0, 1.0), where)
-        mesh = resolve_uri(_attribute(shape, "filename", path), path.parent)
-    elif shape.tag == "box":
+        address = _attribute(shape, "filename", path)
+        try:
+            mesh = resolve_uri(address, path.parent, folders)
+        except RobotError as error:
+            mesh, fault = Path(address), f"{where}: {error}"
+    elif kind == "box":
         size = _vector(shape, "size", (0.0, 0.0, 0.0), where)
-    elif shape.tag == "cylinder":
+    elif kind in ("cylinder", "capsule"):
         size = tuple(_numbers(shape.get(key, ""), 1, where)[0] for key in ("radius", "length"))
-    elif shape.tag == "sphere":
+    elif kind == "sphere":
         size = _numbers(shape.get("radius", ""), 1, where)
     else:
         raise RobotError(
-            f"{where}: geometry is '{shape.tag}', but must be mesh, box, cylinder or sphere."
+            f"{where}: geometry is '{kind}', but must be mesh, box, cylinder, capsule or sphere."
         )
-    quantity = MESH_SCALE if shape.tag == "mesh" else EXTENT
-    quantity.check(size, f"{where}: a number of a '{shape.tag}'", RobotError)
-    if shape.tag == "mesh" and not all(size):
+    quantity = MESH_SCALE if kind == "mesh" else EXTENT
+    quantity.check(size, f"{where}: a number of a '{kind}'", RobotError)
+    if kind == "mesh" and not all(size):
         raise RobotError(f"{where}: a mesh has the scale {size}, but 0 would flatten it.")
     xyz, rpy = _origin(element, where)
     material = element.find("material")
     rgba = None
     if material is not None:
-        rgba = _colour(material, path) or colours.get(material.get("name", ""))
-    return Geometry(
+        rgba = _colour(material) or colours.get(material.get("name", ""))
+    found = Geometry(
         role="visual" if element.tag == "visual" else "collision",
-        shape=shape.tag,  # type: ignore[arg-type]  # one of the four tested above
+        shape="cylinder" if kind == "capsule" else kind,  # type: ignore[arg-type]  # tested above
         size=size,
         mesh=mesh,
         xyz=xyz,
         rpy=rpy,
         rgba=rgba,  # type: ignore[arg-type]  # four numbers, see _colour
+        fault=fault,
+    )
+    return (found, *_caps(found)) if kind == "capsule" else (found,)
+
+
+def _caps(cylinder: Geometry) -> tuple[Geometry, ...]:
+    """Return the spheres that make a cylinder a capsule, whose length is between their centres."""
+    radius, length = cylinder.size
+    along = Rotation.from_euler("xyz", cylinder.rpy).as_matrix()[:, 2] * (length / 2)
+    ends = np.array(cylinder.xyz) + np.stack([along, -along])
+    return tuple(
+        replace(cylinder, shape="sphere", size=(radius,), xyz=(float(x), float(y), float(z)))
+        for x, y, z in ends
     )
 
 
-def _colour(material: ElementTree.Element, path: Path) -> tuple[float, ...] | None:
+def _colour(material: ElementTree.Element) -> tuple[float, ...] | None:
+    """Return red, green, blue and opacity; None without a colour, or if it is none."""
     colour = material.find("color")
-    return None if colour is None else _numbers(colour.get("rgba", ""), 4, f"URDF '{path}'")
+    try:
+        return None if colour is None else _numbers(colour.get("rgba", ""), 4, "colour")
+    except RobotError:
+        return None
 
 
 def _origin(element: ElementTree.Element, where: str) -> tuple[Vector, Vector]:

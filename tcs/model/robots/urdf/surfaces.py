@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tcs.errors import RobotError
-from tcs.files.quantities import SIZE
 from tcs.files.unchanged import kept_while_unchanged
 from tcs.model.robots.cutting import distinct
 from tcs.model.robots.urdf.meshes import mesh_triangles
@@ -21,6 +20,10 @@ FloatArray = NDArray[np.float64]
 MARKER_SIZE = 0.011
 """A box, cylinder or sphere of at most this length and width [m] marks a frame and is not part of
 the robot."""
+
+LARGEST_PART = 8.0
+"""Farthest that a surface may reach from the origin of its link [m]: meshes whose unit was
+forgotten reach farther, and no part of a mobile manipulator does."""
 
 _ROUND_SECTIONS = 48
 
@@ -46,19 +49,35 @@ def body_triangles(model: Urdf) -> dict[str, FloatArray]:
         geometries = surface_geometries(model, body)
         if geometries:
             meshes = tuple(g.mesh for g in geometries if g.mesh is not None)
-            found[body] = _placed_triangles(meshes, geometries)
+            found[body] = _placed_triangles(meshes, geometries, body)
     return found
 
 
 @kept_while_unchanged(files=64)
-def _placed_triangles(meshes: tuple[Path, ...], geometries: tuple[Geometry, ...]) -> FloatArray:
+def _placed_triangles(
+    meshes: tuple[Path, ...], geometries: tuple[Geometry, ...], body: str
+) -> FloatArray:
     """Return the triangles of the geometries of a body in its frame [m], shape (n, 3, 3).
 
     Args:
         meshes: The files of those that are meshes.
         geometries: The geometries.
+        body: Name of the body in messages.
+
+    Raises:
+        RobotError: If one cannot be read, or reaches farther than `LARGEST_PART`.
     """
     pieces = [place(geometry_triangles(g), g.xyz, g.rpy) for g in geometries]
+    for geometry, triangles in zip(geometries, pieces, strict=True):
+        farthest = float(np.abs(triangles).max())
+        if farthest > LARGEST_PART:
+            what = f"mesh '{geometry.mesh}'" if geometry.mesh else f"a {geometry.shape}"
+            raise RobotError(
+                f"link '{body}': {what} reaches {farthest:,.1f} m from its origin, but a part of a "
+                f"robot reaches {LARGEST_PART:g} m at most. Write metres, or give the mesh the "
+                "'scale' of its unit, e.g. 0.001 0.001 0.001 for millimetres; what is no part of "
+                "the robot is left out with --ignore LINK."
+            )
     # One mesh often is both visual and collision geometry.
     corners, _ = distinct(np.concatenate(pieces).reshape(-1, 9))
     corners.setflags(write=False)
@@ -77,14 +96,7 @@ def geometry_triangles(geometry: Geometry) -> FloatArray:
     triangles encloses the round geometry as well.
     """
     if geometry.mesh is not None:
-        triangles = np.asarray(mesh_triangles(geometry.mesh) * np.array(geometry.size))
-        farthest = float(np.abs(triangles).max())
-        if farthest > SIZE.high:
-            raise RobotError(
-                f"mesh '{geometry.mesh}' reaches {farthest:,.0f} m from its origin; at most "
-                f"{SIZE.high:g} m. Give it the scale of its unit, e.g. 0.001 for millimetres."
-            )
-        return triangles
+        return np.asarray(mesh_triangles(geometry.mesh) * np.array(geometry.size))
     # Its import takes long, and scenes of robots that ship are built without it.
     import trimesh
 

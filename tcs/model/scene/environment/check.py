@@ -14,7 +14,11 @@ from tcs.kernel.collide import BOUND, CENTRE, ROTATION, SIZE, TYPE, closer, pack
 from tcs.model.grid import Grid
 from tcs.model.robots.primitives import union_volume
 from tcs.model.scene.environment.environment_file import FLOOR, EnvironmentFile, Obstacle
-from tcs.model.scene.environment.obstacle_shapes import obstacle_shapes, solid_volume
+from tcs.model.scene.environment.obstacle_shapes import (
+    obstacle_shapes,
+    open_surface,
+    solid_volume,
+)
 from tcs.model.scene.environment.shapes import named_shapes
 
 REACH = 2.0
@@ -32,7 +36,10 @@ class ObstacleShapes:
         type: What it is, e.g. "mesh".
         count: Number of shapes.
         volume: Volume of the shapes together [m^3], None for a model.
-        excess: That volume over the obstacle's own, None for a model or a point cloud.
+        excess: That volume over the obstacle's own, None for a model, a point cloud or a mesh that
+            is not closed.
+        open_edges: Edges of a mesh that do not join two triangles; 0 for all else.
+        thickness: Volume of the shapes over the area of such a mesh [m], None for all else.
     """
 
     name: str
@@ -40,6 +47,8 @@ class ObstacleShapes:
     count: int
     volume: float | None
     excess: float | None
+    open_edges: int = 0
+    thickness: float | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return the values as plain containers."""
@@ -49,6 +58,8 @@ class ObstacleShapes:
             "shapes": self.count,
             "volume_m3": self.volume,
             "excess": self.excess,
+            "open_edges": self.open_edges,
+            "thickness_m": self.thickness,
         }
 
 
@@ -94,11 +105,19 @@ class EnvironmentCheck:
     @property
     def notes(self) -> tuple[str, ...]:
         """What to review, one sentence each."""
-        return tuple(
+        found = [
             f"'{name}' is more than {REACH:g} m from every base position of the grid, so it has "
             "no effect."
             for name in self.outside
-        )
+        ]
+        found += [
+            f"the mesh of '{obstacle.name}' is not closed ({obstacle.open_edges:,} edges): its "
+            f"surface counts as solid, {(obstacle.thickness or 0.0) * 1e3:.0f} mm thick on "
+            "average, and what it surrounds as free."
+            for obstacle in self.obstacles
+            if obstacle.open_edges
+        ]
+        return tuple(found)
 
     @property
     def is_sound(self) -> bool:
@@ -174,7 +193,9 @@ def _described(obstacle: Obstacle, count: int, where: str) -> ObstacleShapes:
     shapes, solid = obstacle_shapes(obstacle, here), solid_volume(obstacle, here)
     volume = union_volume(shapes) if shapes else None
     excess = volume / solid if volume is not None and solid else None
-    return ObstacleShapes(obstacle.name, obstacle.type, count, volume, excess)
+    edges, area = open_surface(obstacle, here) or (0, 0.0)
+    thickness = volume / area if volume is not None and area else None
+    return ObstacleShapes(obstacle.name, obstacle.type, count, volume, excess, edges, thickness)
 
 
 def _extents(rows: FloatArray) -> tuple[FloatArray, FloatArray]:

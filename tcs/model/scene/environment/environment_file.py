@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
@@ -22,10 +23,12 @@ from tcs.files.documents import (
     read_mapping,
 )
 from tcs.files.paths import DataFiles, data_folder, expanded
+from tcs.files.unchanged import kept_while_unchanged
 from tcs.model.grid import Axis, Grid
 from tcs.model.people import JOINTS, Person, PersonEntry, PersonLike, load_person
 from tcs.model.scene.environment.error_distribution import ErrorDistribution
 from tcs.model.scene.environment.furniture import BedEntry, WheelchairEntry
+from tcs.model.scene.environment.model_files import CLOUDS, MESHES
 from tcs.model.scene.mounting import FurnitureMount
 from tcs.model.scene.person.posture import Posture
 
@@ -67,7 +70,7 @@ class Obstacle(_NamedEntry):
     capsule: tuple[Size, Size] | None = None
     """Radius, and length between the centres of its caps along its own z [m]."""
     file: str | None = None
-    """An SDFormat model, a closed mesh, or a point cloud."""
+    """An SDFormat or URDF model, a mesh, or a point cloud."""
     scale: Annotated[float, Field(gt=0.0, le=1000.0)] | None = None
     """Metres per unit of a mesh or a point cloud; None is 1."""
     protrusion: Annotated[float, Field(ge=0.002, le=0.2)] | None = None
@@ -82,7 +85,9 @@ class Obstacle(_NamedEntry):
             raise ValueError(
                 f"give one of {', '.join(SHAPES)}, not {' and '.join(given) or 'none'}"
             )
-        allowed = _OPTIONS.get(self.type, ())
+        # What a PLY file holds is known once it is found; `obstacle_shapes` checks its options.
+        unknown = self.file is not None and Path(self.file).suffix.lower() == _EITHER
+        allowed = tuple(_OPTION_OF) if unknown else _OPTIONS.get(self.type, ())
         for key in ("scale", "protrusion", "cell"):
             if getattr(self, key) is not None and key not in allowed:
                 raise ValueError(f"{key} is for {_OPTION_OF[key]}")
@@ -94,20 +99,37 @@ class Obstacle(_NamedEntry):
         if self.file is None:
             return next(key for key in SHAPES if getattr(self, key) is not None)
         suffix = Path(self.file).suffix.lower()
+        if suffix == _EITHER:
+            return "mesh" if _has_faces(Path(self.file)) else "cloud"
         if suffix in MESHES:
             return "mesh"
         return "cloud" if suffix in CLOUDS else "model"
 
 
 SHAPES = ("box", "sphere", "cylinder", "capsule", "file")
-MESHES = (".obj", ".stl", ".glb", ".gltf")
-CLOUDS = (".ply", ".npy")
+_HEADER = 65_536
+"""Most bytes of the header of a PLY file."""
+_EITHER = ".ply"
+"""Type of files that hold a mesh or a point cloud."""
 _OPTIONS = {"mesh": ("scale", "protrusion"), "cloud": ("scale", "cell")}
 _OPTION_OF = {
     "scale": f"meshes ({', '.join(MESHES)}) and point clouds ({', '.join(CLOUDS)})",
     "protrusion": f"meshes ({', '.join(MESHES)})",
     "cell": f"point clouds ({', '.join(CLOUDS)})",
 }
+
+
+@kept_while_unchanged(files=64)
+def _has_faces(file: Path) -> bool:
+    """Return whether a PLY file holds faces; not if it cannot be read, which its reader reports."""
+    try:
+        with open(file, "rb") as stream:
+            head = stream.read(_HEADER).split(b"end_header", maxsplit=1)[0]
+    except OSError:
+        return False
+    found = re.search(rb"^element\s+(?:face|tristrips)\s+(\d+)", head, re.MULTILINE)
+    return found is not None and int(found[1]) > 0
+
 
 E = TypeVar("E", ModelEntry, Obstacle)
 

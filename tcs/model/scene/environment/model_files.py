@@ -27,6 +27,10 @@ from tcs.files.xml_documents import read_xml
 
 SUFFIXES = (".sdf", ".urdf")
 """Types of model files: SDFormat, and URDF."""
+MESHES = (".obj", ".stl", ".ply", ".dae", ".glb", ".gltf")
+"""Types of meshes."""
+CLOUDS = (".npy", ".pcd", ".ply")
+"""Types of point clouds; a PLY file with faces is a mesh."""
 RESERVED = "world"
 """Name that Drake gives to the body that does not move; a link of that name would be this body."""
 
@@ -54,7 +58,8 @@ def check_model_file(path: Path, where: str, *, above: tuple[str, ...] = ()) -> 
     if path.suffix.lower() not in SUFFIXES:
         raise EnvironmentFileError(
             f"{where} must be an SDFormat or URDF file, with a name in {' or '.join(SUFFIXES)}; an "
-            "obstacle may also be a mesh or a point cloud."
+            f"obstacle may also be a mesh ({', '.join(MESHES)}) or a point cloud "
+            f"({', '.join(CLOUDS)})."
         )
     root = read_xml(path, where, EnvironmentFileError)
     _check_counts(root, where)

@@ -25,7 +25,8 @@ def cloud_points(file: Path, scale: float, where: str) -> FloatArray:
     """Return the points of a cloud [m], shape (n, 3).
 
     Args:
-        file: A NumPy array of shape (n, 3 or more), or a PLY file, whose faces are ignored.
+        file: A NumPy array of shape (n, 3 or more), a PLY file, or a PCD file. Points with a
+            coordinate that is not a number are left out: a depth camera saw nothing there.
         scale: Metres per unit of the file.
         where: Name of the obstacle in messages.
 
@@ -37,6 +38,8 @@ def cloud_points(file: Path, scale: float, where: str) -> FloatArray:
     try:
         if file.suffix.lower() == ".npy":
             read: Any = np.load(io.BytesIO(content), allow_pickle=False)
+        elif file.suffix.lower() == ".pcd":
+            read = _pcd_points(content)
         else:
             import trimesh
 
@@ -52,11 +55,50 @@ def cloud_points(file: Path, scale: float, where: str) -> FloatArray:
         raise EnvironmentFileError(
             f"{here} has the shape {points.shape}, but must have x, y, z in each row: (n, 3)."
         )
+    points = points[~np.isnan(points[:, :3]).any(axis=1)]
     if not LEAST_POINTS <= len(points) <= MOST_POINTS:
         raise EnvironmentFileError(
             f"{here} has {len(points):,} point(s), but must have {LEAST_POINTS} to "
-            f"{MOST_POINTS:,}. Give single objects as 'box' or 'sphere'."
+            f"{MOST_POINTS:,} whose coordinates are numbers. Give single objects as 'box' or "
+            "'sphere'."
         )
     points = points[:, :3] * scale
     check_positions(points, here, EnvironmentFileError)
     return points
+
+
+_PCD_TYPES = {"F": "f", "I": "i", "U": "u"}
+
+
+def _pcd_points(content: bytes) -> FloatArray:
+    """Return x, y, z of a PCD file in ASCII or binary, shape (n, 3).
+
+    Raises:
+        ValueError: If it is compressed, or no such file.
+    """
+    head: dict[str, list[str]] = {}
+    start = 0
+    while "DATA" not in head:
+        end = content.find(b"\n", start)
+        if end < 0 or end > 65_536:
+            raise ValueError("it has no line DATA")
+        key, *words = content[start:end].decode("ascii", "replace").split() or ["#"]
+        head[key] = words
+        start = end + 1
+    fields, form = head.get("FIELDS", []), " ".join(head["DATA"]).lower()
+    counts = [int(n) for n in head.get("COUNT", ["1"] * len(fields))]
+    if not {"x", "y", "z"} <= set(fields):
+        raise ValueError(f"its fields are {', '.join(fields) or 'none'}, without x, y and z")
+    if form == "ascii":
+        columns = [sum(counts[: fields.index(axis)]) for axis in "xyz"]
+        rows = [line.split() for line in content[start:].decode("ascii", "replace").splitlines()]
+        return np.array([[float(row[k]) for k in columns] for row in rows if row]).reshape(-1, 3)
+    if form != "binary":
+        raise ValueError(f"its points are '{form}'; save it in ASCII or binary")
+    types = zip(fields, head.get("TYPE", []), head.get("SIZE", []), counts, strict=True)
+    layout = np.dtype(
+        [(f"{k} {f}", f"<{_PCD_TYPES[t]}{size}", (n,)) for k, (f, t, size, n) in enumerate(types)]
+    )
+    rows_of = np.frombuffer(content, layout, int(head.get("POINTS", ["0"])[0]), start)
+    named = {name.split()[1]: name for name in layout.names or ()}
+    return np.stack([rows_of[named[axis]][:, 0].astype(np.float64) for axis in "xyz"], axis=1)

@@ -13,7 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import EnvironmentFileError
-from tcs.model.robots.fitting.mesh_shapes import PROTRUSION, closed_mesh, shapes_around_mesh
+from tcs.model.robots.fitting.mesh_shapes import (
+    PROTRUSION,
+    enclosed_volume,
+    open_edges,
+    own_mesh,
+    shapes_around_mesh,
+)
 from tcs.model.robots.primitives import Primitive
 from tcs.model.scene.environment.environment_file import Obstacle
 from tcs.model.scene.environment.obstacle_files import cloud_points
@@ -33,7 +39,7 @@ def obstacle_shapes(obstacle: Obstacle, where: str) -> tuple[Primitive, ...]:
 
     - A cylinder becomes boxes that together are the prism of twelve sides around it, which has 2 %
       more volume.
-    - A closed mesh becomes boxes and capsules that enclose every triangle and the inside.
+    - A mesh becomes boxes and capsules that enclose every triangle, and the inside of a closed one.
     - Of a point cloud, every cell of a grid with a point in it is solid; the boxes are those cells,
       joined.
 
@@ -54,9 +60,21 @@ def obstacle_shapes(obstacle: Obstacle, where: str) -> tuple[Primitive, ...]:
         return _prism(*obstacle.cylinder)
     file, scale = Path(str(obstacle.file)), obstacle.scale or 1.0
     if obstacle.type == "mesh":
+        if obstacle.cell is not None:
+            raise EnvironmentFileError(
+                f"{where}: '{file.name}' has faces, so it is a mesh, and 'cell' is for point "
+                "clouds. Remove 'cell', or save the points alone."
+            )
         protrusion = obstacle.protrusion or PROTRUSION
-        return shapes_around_mesh(file, scale, protrusion, where, EnvironmentFileError)
+        return shapes_around_mesh(
+            file, scale, protrusion, where, EnvironmentFileError, closed=False
+        )
     if obstacle.type == "cloud":
+        if obstacle.protrusion is not None:
+            raise EnvironmentFileError(
+                f"{where}: '{file.name}' has no faces, so it is a point cloud, and 'protrusion' "
+                "is for meshes. Remove it."
+            )
         points = cloud_points(file, scale, where)
         cell = obstacle.cell or CELL
         return tuple(
@@ -67,23 +85,42 @@ def obstacle_shapes(obstacle: Obstacle, where: str) -> tuple[Primitive, ...]:
 
 
 def solid_volume(obstacle: Obstacle, where: str) -> float | None:
-    """Return the volume of an obstacle itself [m^3], None for a model or a point cloud.
+    """Return the volume of an obstacle itself [m^3].
+
+    It is None for a model, a point cloud and a mesh that is not closed.
 
     Raises:
         EnvironmentFileError: If its file cannot be used.
     """
     if obstacle.type == "mesh":
-        triangles = closed_mesh(
-            Path(str(obstacle.file)), obstacle.scale or 1.0, where, EnvironmentFileError
-        )
-        a, b, c = np.moveaxis(triangles, 1, 0)
-        return abs(float(np.einsum("ni,ni->n", a, np.cross(b, c)).sum())) / 6.0
+        triangles = _triangles(obstacle, where)
+        return None if open_edges(triangles) else enclosed_volume(triangles)
     if obstacle.cylinder is not None:
         radius, length = obstacle.cylinder
         return math.pi * radius**2 * length
     if obstacle.type in ("model", "cloud"):
         return None
     return sum(shape.volume for shape in obstacle_shapes(obstacle, where))
+
+
+def open_surface(obstacle: Obstacle, where: str) -> tuple[int, float] | None:
+    """Return the open edges and the area [m^2] of a mesh that is not closed, None for all else.
+
+    Raises:
+        EnvironmentFileError: If its file cannot be used.
+    """
+    if obstacle.type != "mesh":
+        return None
+    triangles = _triangles(obstacle, where)
+    edges = open_edges(triangles)
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    area = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2.0
+    return (edges, area) if edges else None
+
+
+def _triangles(obstacle: Obstacle, where: str) -> FloatArray:
+    scale = obstacle.scale or 1.0
+    return own_mesh(Path(str(obstacle.file)), scale, where, EnvironmentFileError)
 
 
 def _primitive(

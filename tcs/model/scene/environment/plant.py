@@ -13,6 +13,7 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
+    BodyIndex,
     FixedOffsetFrame,
     Frame,
     Joint,
@@ -94,6 +95,13 @@ def add_environment(plant: MultibodyPlant, environment: EnvironmentFile) -> Envi
             links[entry.name] = _add_shapes(plant, entry.name, shapes, X_PM)
             continue
         instance = _add_model(plant, entry, here, of=environment)
+        bodies = [plant.get_body(index) for index in plant.GetBodyIndices(instance)]
+        solid = any(plant.GetCollisionGeometriesForBody(body) for body in bodies)
+        if isinstance(entry, Obstacle) and not solid:
+            raise EnvironmentFileError(
+                f"{here}: '{entry.file}' has no collision geometry, so nothing would be checked "
+                "against it. Give its links 'collision' elements."
+            )
         _fix(plant, instance, parent, X_PM, here)
         for index in plant.GetBodyIndices(instance):
             body = plant.get_body(index)
@@ -245,8 +253,12 @@ def _add_model(
 ) -> ModelInstanceIndex:
     """Parse the entry's file; the model of the person is that of the environment `of`."""
     file = Path(str(entry.file))
-    check_model_file(file, f"{where}: '{entry.file}'")
+    here = f"{where}: '{entry.file}'"
+    check_model_file(file, here)
     text = _own_model(of, entry, where)
+    if text is None and not _is_utf8(file):
+        # Drake reads names as UTF-8 whatever encoding the file declares.
+        text = ElementTree.tostring(read_xml(file, here, EnvironmentFileError), encoding="unicode")
     parser = Parser(plant)
     # Several entries may use one file, e.g. two shelves.
     parser.SetAutoRenaming(True)
@@ -254,7 +266,7 @@ def _add_model(
         if text is None:
             instances = parser.AddModels(str(file))
         else:
-            instances = parser.AddModelsFromString(text, "sdf")
+            instances = parser.AddModelsFromString(text, file.suffix.lower().removeprefix("."))
     except MemoryError:
         raise
     except Exception as error:
@@ -271,6 +283,14 @@ def _add_model(
         _check_free(plant, entry.name, where)
     plant.RenameModelInstance(instance, entry.name)
     return instance
+
+
+def _is_utf8(file: Path) -> bool:
+    try:
+        file.read_bytes().decode()
+    except UnicodeDecodeError:
+        return False
+    return True
 
 
 def _check_free(plant: MultibodyPlant, name: str, where: str) -> None:
@@ -290,7 +310,6 @@ def _fix(
     where: str,
 ) -> None:
     """Weld a model's root to its parent, replacing the pose in the model file."""
-    model_frame = plant.GetFrameByName("__model__", instance)
     joints = [plant.get_joint(index) for index in plant.GetJointIndices(instance)]
     to_world = [j for j in joints if j.parent_body() == plant.world_body()]
     if not all(isinstance(joint, WeldJoint) for joint in to_world):
@@ -304,20 +323,32 @@ def _fix(
     for joint in to_world:
         plant.RemoveJoint(joint)
     roots = [i for i in plant.GetBodyIndices(instance) if i not in moved]
+    # A URDF has no frame of the model beside that of its root link.
+    of_model = plant.HasFrameNamed("__model__", instance)
+    if not of_model and len(roots) == 1:
+        plant.WeldFrames(parent, plant.get_body(roots[0]).body_frame(), X_PM)
+        return
+    if not of_model:
+        raise EnvironmentFileError(_roots_message(plant, roots, where))
+    model_frame = plant.GetFrameByName("__model__", instance)
     if len(roots) == 1:
         plant.WeldFrames(parent, model_frame, X_PM)
         return
     if not all(root in pose_of for root in roots):
-        names = ", ".join(plant.get_body(root).name() for root in roots)
-        raise EnvironmentFileError(
-            f"{where}: the model has {len(roots)} links without a parent: {names}. "
-            "Connect them with joints."
-        )
+        raise EnvironmentFileError(_roots_message(plant, roots, where))
     base = model_frame.body().index()
     X_WM = pose_of[base] @ model_frame.GetFixedPoseInBodyFrame()
     for root in roots:
         X_PL = X_PM @ X_WM.inverse() @ pose_of[root]
         plant.WeldFrames(parent, plant.get_body(root).body_frame(), X_PL)
+
+
+def _roots_message(plant: MultibodyPlant, roots: list[BodyIndex], where: str) -> str:
+    names = ", ".join(plant.get_body(root).name() for root in roots) or "none"
+    return (
+        f"{where}: the model has {len(roots)} links without a parent: {names}. "
+        "Connect them with joints."
+    )
 
 
 def _check_names(

@@ -143,3 +143,16 @@ def test_a_collada_file_that_is_none_is_refused(tmp_path, text):
     with pytest.raises(RobotError, match=r"part\.dae'") as caught:
         mesh_triangles(path)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("unit", "size"), [("0.001", 0.001), ("0.01", 0.01), ("1", 1.0)])
+def test_lengths_of_a_collada_file_are_in_its_unit(tmp_path, unit, size):
+    """As ROS tools read it; before, a part in millimetres became a thousand times as large."""
+    path = tmp_path / "part.dae"
+    named = f'<asset><unit name="some" meter="{unit}"/>'
+    path.write_text(collada().replace("<asset>", named))
+    assert sorted(mesh_triangles(path)[:, 0, 0]) == [size, 2 * size]
+    assert f"v {size:.8f}" in as_obj(path).read_text()
+    path.write_text(collada().replace("<asset>", named.replace(unit, "0")))
+    with pytest.raises(RobotError, match="its unit is 0 m"):
+        mesh_triangles(path)
