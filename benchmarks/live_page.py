@@ -54,11 +54,11 @@ def main() -> int:
 def drive(browser: str, robot: str, seconds: float, seed: int) -> None:
     """Drive an arm for a while with the page open, and print how long everything took."""
     session = LiveSession(LiveOptions(robot=robot), port=None, on_stop=lambda _: None, record=False)
-    page, meshcat = session.page, session.page._meshcat
+    page, link = session.page, session.link
     rng = np.random.default_rng(seed)
     with opened(browser, session.url):
         end = time.monotonic() + CONNECTED_WITHIN
-        while meshcat.GetNumActiveConnections() == 0 and time.monotonic() < end:
+        while not link.read().watched and time.monotonic() < end:
             page.run(SLICE)
         for durations in (page.steps, page.worked, page.pictures):
             del durations.taken[:]
@@ -66,7 +66,7 @@ def drive(browser: str, robot: str, seconds: float, seed: int) -> None:
         begun, busy = time.perf_counter(), time.process_time()
         while time.perf_counter() - begun < seconds:
             for name in RATE_SLIDERS:
-                meshcat.SetSliderValue(name, float(0.05 * rng.normal()))
+                link.set_slider(name, float(0.05 * rng.normal()))
             page.run(SLICE)
         wall, cpu = time.perf_counter() - begun, time.process_time() - busy
     for line, text in (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import secrets
 import sys
 import threading
 import time
@@ -29,11 +30,15 @@ _UNUSED = 3
 the variable of the loop and the argument."""
 
 
-def open_meshcat(port: int | None = None) -> Meshcat:
+def open_meshcat(port: int | None = None, *, hidden: bool = False) -> Meshcat:
     """Return an empty Meshcat that only this machine can open.
+
+    Any page in a browser of this machine can open its socket, which asks for no origin.
 
     Args:
         port: Its port; by default the first free one from 7000 on.
+        hidden: Whether it listens where only who knows the address finds it: at any port of any of
+            16 million loopback addresses, where the system has them (Linux).
 
     Raises:
         OutputError: If the port is not free.
@@ -45,8 +50,13 @@ def open_meshcat(port: int | None = None) -> Meshcat:
     log = logging.getLogger("drake")
     level = log.level
     log.setLevel(logging.WARNING)
+    host = "localhost"
+    if hidden:
+        port = 0
+        if sys.platform == "linux":
+            host = f"127.{'.'.join(str(1 + secrets.randbelow(254)) for _ in range(3))}"
     try:
-        meshcat = Meshcat(MeshcatParams(host="localhost", port=port, show_stats_plot=False))
+        meshcat = Meshcat(MeshcatParams(host=host, port=port, show_stats_plot=False))
     except RuntimeError as error:
         where = "a port from 7000 to 7099" if port is None else f"port {port}"
         raise OutputError(f"the viewer cannot listen at {where}. Give a free one.") from error

@@ -1,8 +1,7 @@
 """Operator input: keys, sliders and gamepad become commands; no browser is needed.
 
-The operator's page reports which keys are held (`tcs.output.view.teleop.page_link`). Meshcat counts
-presses of its own buttons and does not report releases: such a press moves the arm for a moment
-only, so that an arm whose operator is gone stops by itself.
+The operator's page reports which keys are held, sliders and gamepad
+(`tcs.output.view.teleop.page_link`). A press without a release moves the arm for a moment only.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from tcs.teleop.control.settings import NULL_SPACE_MODES
 
 FloatArray = NDArray[np.float64]
 TAP = 0.15
-"""How long a press of a button of Meshcat moves the arm [s]."""
+"""How long a press of a button without a release moves the arm [s]."""
 MOST_LINEAR, MOST_ANGULAR = 0.25, 1.0
 """Greatest commanded velocities [m/s, rad/s]."""
 DEAD_LINEAR, DEAD_ANGULAR = 0.02, 0.05
@@ -47,6 +46,8 @@ MOVES: Mapping[str, tuple[int, float, str]] = {
     "turn right": (5, -1.0, "KeyL"),
 }
 """Buttons that move the tool: axis of the twist, direction, and key."""
+SILENT = "the page that moves the arm is not heard: the arm stops."
+NO_BROWSER = "no browser is connected to this page: the arm stops until one is."
 OTHERS: Mapping[str, str] = {
     TURN_DOWN: "KeyQ",
     TURN_UP: "KeyE",
@@ -109,6 +110,8 @@ class Reading:
     """State of an XR controller; None if there is none."""
     held: frozenset[str] = frozenset()
     """Buttons whose keys are held down on the operator's page."""
+    silent: bool = False
+    """Whether a page whose input moves the arm has not been heard for a moment."""
 
 
 class Source(Protocol):
@@ -190,13 +193,18 @@ class OperatorInput:
         back = BACK in pressed
         lost = pad.lost or hand.lost
         if not reading.watched:
-            # Meshcat keeps the state of the last browser.
             self._gamepad.reset()
-            lost = "no browser is connected to this page: the arm stops until one is."
+            lost = NO_BROWSER
         if STOP in pressed:
             self._gamepad.dismiss()
             if self.pose_device is not None:
                 self.pose_device.dismiss()
+        if reading.silent and not (back or lost or STOP in pressed):
+            # The page may be heard again at once, and what it holds then counts as before.
+            self._until.clear()
+            if self.set_point is not None:
+                self.set_point.drop()
+            return OperatorCommand(Command(mode=self.mode, clutch=True), SILENT)
         if back or lost or STOP in pressed or self.mode is not mode:
             # What is held was pressed for what the arm did before.
             self._ignored = reading.held

@@ -10,22 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import Meshcat
 
-from tcs.output.view.teleop.controls import (
-    RATE_SLIDERS,
-    OperatorCommand,
-    OperatorInput,
-    Reading,
-    Source,
-    buttons,
-    key_name,
-    sliders,
-)
-from tcs.output.view.teleop.gamepad import gamepad_state
-from tcs.output.view.teleop.page_link import PageControls, PageLink
-from tcs.output.view.teleop.panel import Panel, mode_line, readout, state_facts
-from tcs.output.view.teleop.pose_device import PoseDevice, pose_state
+from tcs.output.view.teleop.controls import NO_BROWSER, OperatorCommand, OperatorInput
+from tcs.output.view.teleop.page_link import PageLink
+from tcs.output.view.teleop.panel import mode_line, readout, state_facts
+from tcs.output.view.teleop.pose_device import PoseDevice
 from tcs.output.view.teleop.robot_display import TARGET, TOOL, RobotDisplay, Trail, pose_of
-from tcs.output.view.teleop.set_point import SetPoint, joint_sliders
+from tcs.output.view.teleop.set_point import SetPoint
 from tcs.output.view.teleop.timing import Durations, StepClock
 from tcs.teleop import Arm, Command, Mode, Settings, Step, Teleoperation
 from tcs.teleop.control.latency import DelayLine, Latency
@@ -41,54 +31,11 @@ _CHECK_EVERY = 7
 """Frames between two self-contact checks: five checks a second."""
 
 
-class MeshcatControls:
-    """Sliders, buttons and gamepad of a Meshcat."""
-
-    def __init__(self, meshcat: Meshcat, groups: int, set_points_of: Arm | None = None) -> None:
-        """Add the controls to Meshcat.
-
-        Args:
-            meshcat: The Meshcat.
-            groups: Number of joint groups.
-            set_points_of: Arm whose joints have a slider each; None for none.
-        """
-        self._meshcat = meshcat
-        self._sliders = sliders()
-        if set_points_of is not None:
-            self._sliders |= joint_sliders(set_points_of.lower, set_points_of.upper)
-        self._buttons = buttons(groups)
-        for name, key in self._buttons.items():
-            meshcat.AddButton(f"{name} ({key_name(key)})", key)
-        for name, (low, high, step, value) in self._sliders.items():
-            meshcat.AddSlider(name, low, high, step, value)
-
-    def read(self) -> Reading:
-        """Return the present state of the controls."""
-        meshcat = self._meshcat
-        pad = meshcat.GetGamepad()
-        return Reading(
-            {name: meshcat.GetSliderValue(name) for name in self._sliders},
-            {
-                name: meshcat.GetButtonClicks(f"{name} ({key_name(key)})")
-                for name, key in self._buttons.items()
-            },
-            gamepad_state(pad.index, pad.axes, pad.button_values),
-            meshcat.GetNumActiveConnections() > 0,
-            pose_state(pad.index, pad.axes, pad.button_values),
-        )
-
-    def zero(self) -> None:
-        """Reset every slider of a rate to zero."""
-        for name in RATE_SLIDERS:
-            self._meshcat.SetSliderValue(name, 0.0)
-
-    def set_slider(self, name: str, value: float) -> float:
-        """Set a slider, and return the value that it has then: in its range, at a step of it."""
-        return float(self._meshcat.SetSliderValue(name, value))
-
-
 class LivePage:
-    """An arm in Meshcat, teleoperated by the controls of its page."""
+    """An arm in Meshcat, teleoperated by the controls of the operator's page.
+
+    Meshcat shows the scene only: its socket tells no page of this machine from one of elsewhere.
+    """
 
     def __init__(
         self,
@@ -99,8 +46,8 @@ class LivePage:
         *,
         settings: Settings,
         modes: tuple[Mode, ...],
+        link: PageLink,
         latency: Latency | None = None,
-        link: PageLink | None = None,
         on_stop: Callable[[str], None],
         on_step: Callable[[Command, Step], None] | None = None,
         on_show: Callable[[FloatArray], None] | None = None,
@@ -114,10 +61,9 @@ class LivePage:
             start: Joint positions at the start [rad], shape (7,).
             settings: Settings of the controller.
             modes: Modes that the operator can switch between, the initial one first.
+            link: Controls of the operator's page, which shows the readout.
             latency: Latency between the operator and the arm; None for none. A lost operator and
                 the return to the start act at once.
-            link: Keys of the operator's page, which shows the readout; None where Meshcat's own
-                page has keys and panel.
             on_stop: Called with the reason whenever the arm stops, or its reason changes.
             on_step: Called after each step with the command that the arm executes and the step,
                 once a browser has connected.
@@ -127,14 +73,10 @@ class LivePage:
             TcsError: If the start posture is not seven finite numbers.
         """
         self.session = Teleoperation(arm, start, settings, modes[0])
-        groups, of_joints = len(settings.groups), Mode.JOINT in modes
-        controls: Source = MeshcatControls(meshcat, groups, arm if of_joints else None)
-        if link is not None:
-            controls = PageControls(controls, link)
         self.operator = OperatorInput(
-            controls, modes, groups,
+            link, modes, len(settings.groups),
             pose_device=PoseDevice(settings.period),
-            set_point=SetPoint(lambda: self.seen.joints) if of_joints else None,
+            set_point=SetPoint(lambda: self.seen.joints) if Mode.JOINT in modes else None,
         )  # fmt: skip
         self.steps, self.pictures, self.worked = Durations(), Durations(), Durations()
         self.dropped = 0
@@ -146,7 +88,7 @@ class LivePage:
         self._watched = False
         self._shown = 0
         display.set_up(meshcat, arm.kinematics(self._start).p)
-        self._panel = Panel(meshcat, arm) if link is None else link
+        self._link = link
         self._trail = Trail(meshcat)
         self._input = OperatorCommand(Command())
         self.last = self.seen = self.session.step(_REST)
@@ -218,7 +160,7 @@ class LivePage:
         meshcat.SetTransform(TARGET, pose_of(seen.target_R, seen.target_p))
         self._trail.add(seen.p)
         mode, message = self.mode_line(), self.message(time.perf_counter())
-        self._panel.show(readout(self._arm, seen.joints, seen.limits, seen.singular, mode, message))
+        self._link.show(readout(self._arm, seen.joints, seen.limits, seen.singular, mode, message))
         if self._on_show is not None:
             self._on_show(seen.joints)
         self.pictures.add(time.perf_counter() - begun)
@@ -260,7 +202,8 @@ class LivePage:
         Args:
             now: Time [s].
         """
-        if now < self._message_until:
+        # Who reads that no browser is connected is connected.
+        if now < self._message_until and self._message != NO_BROWSER:
             return self._message
         facts = [state_facts(self.seen.limits, self.seen.singular)]
         if self._touching:

@@ -1,8 +1,8 @@
 "use strict";
 
-// Keys and bars of the operator. Which keys are held is sent when it changes and twenty times a
-// second; the reply is what the bars and lines show.
-const PERIOD = 50; // ms between two messages
+// Controls and bars of the operator. What is held is sent when it changes and twenty times a second;
+// the reply is what the bars and lines show.
+const PERIOD = 40; // ms between two messages
 const PATIENCE = 1000; // ms without a reply after which the page says so
 const STOOD_STILL = 1.5 * PATIENCE; // ms; a page that runs notices a missing reply sooner
 const STATES = { free: "", limit: "limit", singular: "singular" };
@@ -12,6 +12,10 @@ const holders = new Map(); // code of a key -> what holds it: "key", or the numb
 const tapped = new Set(); // keys that went down since the last message
 const clicks = {}; // presses so far of keys that switch
 const caps = new Map(); // code of a key -> its button on the page
+const moved = new Map(); // sliders that were moved, until the reply says so
+const shown = new Map(); // name of a slider -> its input and output
+let gamepad = {}; // as Meshcat names its parts; empty without one
+let device = null; // an XR controller in its place
 const pageName = `${Date.now()}-${Math.random()}`;
 let messages = 0;
 let wake = () => {};
@@ -48,7 +52,7 @@ function showKeys() {
 function onKey(event) {
   const code = event.code;
   const cap = event.target.closest ? event.target.closest("#desk [data-code]") : null;
-  const typed = /^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName || "");
+  const typed = /^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName || "") && event.target.type !== "range";
   if (cap && code === "Enter") {
     event.preventDefault();
     if (event.type === "keydown") press(cap.dataset.code, "enter");
@@ -65,8 +69,51 @@ function onKey(event) {
 addEventListener("keydown", onKey, true);
 addEventListener("keyup", onKey, true);
 addEventListener("blur", releaseAll);
-addEventListener("pagehide", releaseAll);
-document.addEventListener("visibilitychange", () => document.hidden && releaseAll());
+addEventListener("pagehide", () => {
+  releaseAll();
+  navigator.sendBeacon("link", message({ leaves: true }));
+});
+document.addEventListener("visibilitychange", () => {
+  if (!document.hidden) return;
+  releaseAll();
+  readGamepad();
+});
+
+// A page in the background is told nothing of a gamepad: it has none.
+function readGamepad() {
+  const pads = document.hidden ? [] : [...(navigator.getGamepads ? navigator.getGamepads() : [])];
+  const pad = pads.find((one) => one && one.connected);
+  const rounded = (value) => Math.max(-1, Math.min(1, Math.round(value * 100) / 100));
+  const now = !pad ? {} : {
+    index: pad.index, axes: [...pad.axes].map(rounded),
+    button_values: pad.buttons.map((one) => rounded(one.value)),
+  };
+  const changed = JSON.stringify(now) !== JSON.stringify(gamepad);
+  gamepad = now;
+  if (changed) wake();
+}
+
+function sliderRow(slider) {
+  const properties = { type: "range", min: slider.low, max: slider.high, step: slider.step };
+  const input = element("input", { ...properties, value: slider.value, "data-slider": slider.name });
+  const output = element("output", {}, String(slider.value));
+  input.addEventListener("input", () => {
+    output.textContent = input.value;
+    moved.set(slider.name, Number(input.value));
+    wake();
+  });
+  shown.set(slider.name, { input, output });
+  return element("label", {}, element("span", {}, slider.name), input, output);
+}
+
+function showSliders(values) {
+  for (const [name, value] of Object.entries(values)) {
+    const row = shown.get(name);
+    if (!row || moved.has(name) || Number(row.input.value) === value) continue;
+    row.input.value = value;
+    row.output.textContent = row.input.value;
+  }
+}
 
 function element(name, properties = {}, ...content) {
   const made = document.createElement(name);
@@ -149,31 +196,39 @@ function setText(line, text) {
 }
 
 function show(readout) {
+  showSliders(readout.sliders);
   readout.fractions.forEach((fraction, i) => showBar(bars[i], fraction, readout.states[i]));
   setText(modeLine, readout.mode);
   const asked = readout.ignored ? "Release the keys: the connection was lost for a while." : "";
   setText(messageLine, readout.message || asked);
 }
 
-function message() {
+function message(more = {}) {
   const held = new Set(tapped);
   tapped.clear();
   for (const code of holders.keys()) if (KEYS.get(code).hold) held.add(code);
   messages += 1;
-  return JSON.stringify({ page: pageName, number: messages, held: [...held], clicks });
+  const sliders = Object.fromEntries(moved);
+  const pad = device || gamepad;
+  return JSON.stringify({
+    page: pageName, number: messages, held: [...held], clicks, sliders, gamepad: pad, ...more,
+  });
 }
 
 async function exchange() {
   for (;;) {
     const begun = performance.now();
     const changed = new Promise((done) => (wake = done));
+    const sent = new Map(moved);
     try {
       const reply = await fetch("link", {
         method: "POST", cache: "no-store", body: message(),
         headers: { "Content-Type": "application/json" }, signal: AbortSignal.timeout(PATIENCE),
       });
       if (!reply.ok) throw new Error(reply.statusText);
-      show(await reply.json());
+      const readout = await reply.json();
+      for (const [name, value] of sent) if (moved.get(name) === value) moved.delete(name);
+      show(readout);
     } catch (error) {
       const isLate = error.name === "TimeoutError";
       // Where the page itself stood still, the reply may have come in time: it asks again at once.
@@ -192,8 +247,10 @@ function showDesk() {
   const meters = element("section", { id: "bars", "aria-label": "joints" });
   meters.append(...bars.map((bar) => bar.meter));
   const keys = element("div", { id: "keys" }, ...keyGroups());
+  const sliders = element("details", { id: "sliders" }, element("summary", {}, "sliders"));
+  sliders.append(...TCS.sliders.map(sliderRow));
   const title = element("h1", {}, TCS.title);
-  const desk = element("main", { id: "desk" }, title, lines, meters, keys);
+  const desk = element("main", { id: "desk" }, title, lines, meters, keys, sliders);
   document.body.append(desk);
   // The scene has the height that the desk leaves.
   new ResizeObserver(() => {
@@ -212,5 +269,7 @@ function nameControls() {
 }
 
 showDesk();
+// Meshcat would send gamepads over its own socket, which nothing reads.
+handle_gamepads = readGamepad;
 exchange();
 setInterval(nameControls, 1000);

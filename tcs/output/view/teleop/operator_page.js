@@ -60,13 +60,11 @@ async function showCameras() {
 
 if (TCS.cameras) showCameras();
 
-// XR controller: while a session runs, its pose is sent on Meshcat's socket in place of a gamepad:
-// number of the frame, position and quaternion (xyzw) with z up, trigger and side button.
-function sendDevice(gamepad) {
-  const socket = viewer.connection;
-  if (socket && socket.readyState === WebSocket.OPEN) {
-    socket.send(MeshCat.msgpack.encode({ type: "gamepad", name: "", gamepad }));
-  }
+// XR controller: while a session runs, its pose is sent in place of a gamepad: number of the frame,
+// position and quaternion (xyzw) with z up, trigger and side button.
+function sendDevice(now) {
+  device = now;
+  wake();
 }
 
 function rightController(session) {
@@ -86,8 +84,6 @@ function poseOf(frame, source) {
 }
 
 function driveBySession(session) {
-  const ofBrowser = handle_gamepads;
-  handle_gamepads = () => {};
   let number = 0;
   let running = true;
   const onFrame = (_, frame) => {
@@ -107,8 +103,7 @@ function driveBySession(session) {
   session.requestAnimationFrame(onFrame);
   session.addEventListener("end", () => {
     running = false;
-    sendDevice({});
-    handle_gamepads = ofBrowser;
+    sendDevice(null);
   });
 }
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
+from urllib.parse import urlsplit
 
 import numpy as np
 
@@ -15,11 +16,12 @@ from tcs.kernel.arrays import FloatArray
 from tcs.model.robots import load_robot
 from tcs.output.view.live import open_meshcat
 from tcs.output.view.teleop.cameras import Cameras
-from tcs.output.view.teleop.controls import buttons
+from tcs.output.view.teleop.controls import buttons, sliders
 from tcs.output.view.teleop.live import LivePage
 from tcs.output.view.teleop.operator_page import OperatorPage, desk_of, operator_html
 from tcs.output.view.teleop.page_link import PageLink
 from tcs.output.view.teleop.robot_display import RobotDisplay, draw_course
+from tcs.output.view.teleop.set_point import joint_sliders
 from tcs.output.view.teleop.start import start_posture
 from tcs.teleop import Arm, Command, Mode, Settings, Step, load_arm
 from tcs.teleop.arm import torso_height_of
@@ -30,8 +32,8 @@ from tcs.teleop.experiment.trial import GOAL_RADIUS, NO_LATENCY
 from tcs.teleop.runs.recorder import Recorder
 from tcs.teleop.runs.run import Run
 
-_PAGE_PORT = 100
-"""Port of the operator's page above that of Meshcat, where none is given and that one is free."""
+_PAGE_PORT = 7100
+"""Port of the operator's page, where none is given and this one is free."""
 LiveCondition = Literal["end-effector", "novel", "assisted", "drake", "joint"]
 CONDITION_MODES: Mapping[LiveCondition, tuple[Mode, ...]] = {
     "end-effector": (Mode.END_EFFECTOR,),
@@ -81,7 +83,7 @@ class LiveSession:
         page: The live page.
         url: Address of the page.
         cameras: The camera pictures; None without.
-        link: Keys of the page, and the readout that it shows.
+        link: Controls of the page, and the readout that it shows.
     """
 
     cameras: Cameras | None
@@ -113,7 +115,7 @@ class LiveSession:
         robot = load_robot(options.robot)
         self.arm = load_arm(robot, torso_height=torso_height_of(robot, options.torso_height))
         start = None if options.start_deg is None else _start(self.arm, options.start_deg)
-        meshcat = self._meshcat = open_meshcat(port)
+        meshcat = self._meshcat = open_meshcat(hidden=True)
         display = RobotDisplay(self.arm, meshes=True)
         self.course = options.course
         if self.course is None and options.line:
@@ -125,7 +127,10 @@ class LiveSession:
         self._recorder, self._on_step = Recorder(self.arm), on_step
         self._on_stop, self._fault = on_stop, ""
         settings = Settings(limits=options.behaviour)
-        self.link = PageLink(buttons(len(settings.groups)))
+        controls = sliders()
+        if Mode.JOINT in CONDITION_MODES[options.condition]:
+            controls |= joint_sliders(self.arm.lower, self.arm.upper)
+        self.link = PageLink(buttons(len(settings.groups)), controls)
         self._open_page(start, port, settings)
         self.page = LivePage(
             meshcat,
@@ -147,20 +152,19 @@ class LiveSession:
     def _open_page(self, start: FloatArray, port: int | None, settings: Settings) -> None:
         """Serve the operator's page, and start its cameras."""
         options = self._options
-        page = operator_html(
-            self._meshcat.port(), desk_of(self.arm, settings.groups),
-            cameras=options.cameras, xr=options.xr,
-        )  # fmt: skip
+        desk = desk_of(self.arm, settings.groups, self.link.sliders)
+        page = operator_html(desk, cameras=options.cameras, xr=options.xr)
+        scene = urlsplit(self._meshcat.web_url())
+        address = str(scene.hostname), self._meshcat.port()
         self.cameras = Cameras(self.arm, start) if options.cameras else None
         pictures = dict if self.cameras is None else self.cameras.pictures
-        page_port = self._meshcat.port() + _PAGE_PORT if port is None else port + 1
         try:
-            self._server = OperatorPage(page, pictures, self.link, page_port)
+            self._server = OperatorPage(page, pictures, self.link, address, port or _PAGE_PORT)
         except OutputError:
             if port is not None:
                 self.close_cameras()
                 raise
-            self._server = OperatorPage(page, pictures, self.link)
+            self._server = OperatorPage(page, pictures, self.link, address)
         self.url = self._server.url
 
     def _show_cameras(self, joints: FloatArray) -> None:

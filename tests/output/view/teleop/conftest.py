@@ -8,6 +8,7 @@ import pytest
 from tcs.output.view import open_meshcat
 from tcs.output.view.teleop import LivePage, RobotDisplay
 from tcs.output.view.teleop.controls import Reading, buttons, sliders
+from tcs.output.view.teleop.page_link import PageLink
 from tcs.output.view.teleop.set_point import JOINT_STEP
 from tcs.teleop import Command, Mode, Settings, Teleoperation, load_arm
 from tcs.teleop.runs.recorder import run_from_steps
@@ -70,14 +71,16 @@ class Desk:
     pose: object = None
     watched: bool = True
     held: frozenset[str] = frozenset()
+    silent: bool = False
 
     def press(self, name, times=1):
         self.clicks[name] += times
 
     def read(self):
         return Reading(
-            dict(self.sliders), dict(self.clicks), self.pad, self.watched, self.pose, self.held
-        )
+            dict(self.sliders), dict(self.clicks), self.pad, self.watched, self.pose, self.held,
+            self.silent,
+        )  # fmt: skip
 
     def set_slider(self, name, value):
         self.sliders[name] = value = round(value / JOINT_STEP) * JOINT_STEP
@@ -94,17 +97,37 @@ def desk():
     return Desk()
 
 
+class Clock:
+    """A time that a test sets [s]."""
+
+    now = 100.0
+
+    def __call__(self):
+        return self.now
+
+
+@pytest.fixture
+def clock():
+    return Clock()
+
+
+@pytest.fixture
+def link(clock):
+    return PageLink(buttons(4), sliders(), clock)
+
+
 @pytest.fixture
 def reasons():
     return []
 
 
 @pytest.fixture
-def page(meshcat, iiwa_display, iiwa, ready, reasons, desk):
+def page(meshcat, iiwa_display, iiwa, ready, reasons, desk, link):
     """A live page with the controls of the desk."""
     found = LivePage(
-        meshcat, iiwa_display, iiwa, ready, settings=Settings(), modes=MODES, on_stop=reasons.append
-    )
+        meshcat, iiwa_display, iiwa, ready, settings=Settings(), modes=MODES, link=link,
+        on_stop=reasons.append,
+    )  # fmt: skip
     found.operator.source = desk
     return found
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import socket
 import time
 
 import numpy as np
@@ -8,8 +9,7 @@ import pytest
 from tcs.errors import OutputError
 from tcs.output.view import open_meshcat
 from tcs.output.view.teleop import LivePage, RobotDisplay, start_posture
-from tcs.output.view.teleop.controls import BACK, NEXT_MODE, TAP, TURN_UP, buttons, sliders
-from tcs.output.view.teleop.live import key_name
+from tcs.output.view.teleop.controls import BACK, NEXT_MODE, SILENT, TAP, TURN_UP
 from tcs.output.view.teleop.panel import LIMIT, SINGULAR, readout
 from tcs.teleop import Mode, Settings, load_arm
 from tcs.teleop.control.latency import Latency
@@ -17,6 +17,8 @@ from tcs.teleop.runs.recorder import Recorder
 from tests.output.view.teleop.conftest import MODES, Instead
 
 FORWARD, DOWN = "move x [m/s]", "move z [m/s]"
+AT_REST = {"index": 0, "axes": [0.0] * 4, "button_values": [0.0] * 17}
+PUSHED = {**AT_REST, "axes": [0.0, -1.0, 0.0, 0.0]}
 
 
 def drive(page, steps):
@@ -34,12 +36,85 @@ def test_a_slider_moves_the_tool(page, desk):
     assert np.abs(moved[1:]).max() < 1e-3
 
 
+def receive(link, number, more, page="a"):
+    link.receive({"page": page, "number": number, "held": [], "clicks": {}, **more})
+
+
 @pytest.fixture
-def late(meshcat, iiwa_display, iiwa, ready, reasons, desk):
+def linked(meshcat, iiwa_display, iiwa, ready, reasons, link):
+    """A live page with the controls of its link, whose clock is that of the steps."""
+    return LivePage(
+        meshcat, iiwa_display, iiwa, ready, settings=Settings(), modes=MODES, link=link,
+        on_stop=reasons.append,
+    )  # fmt: skip
+
+
+HANDS = {
+    "key": {"held": ["KeyW"]},
+    "gamepad": {"gamepad": PUSHED},
+    "slider": {"sliders": {FORWARD: 0.25}},
+}
+
+
+@pytest.mark.parametrize("other", [False, True], ids=["alone", "other tab"])
+@pytest.mark.parametrize("hand", HANDS)
+def test_the_arm_rests_soon_after_the_last_message_of_the_hand(
+    linked, link, clock, reasons, hand, other
+):
+    # The greatest speed of keys and sticks.
+    pad = {"gamepad": AT_REST} if hand == "gamepad" else {}
+    receive(link, 1, {**pad, "sliders": {"key speed [m/s]": 0.25}})
+    drive(linked, 2)
+    for number in range(2, 12):
+        receive(link, number, HANDS[hand])
+        for _ in range(5):
+            clock.now += 0.01
+            drive(linked, 1)
+    assert linked.last.rates.any()
+    # The last message was five steps ago.
+    for left in range(6, 31):
+        clock.now += 0.01
+        if other and left % 5 == 0:
+            # Another page is open, and has a gamepad at rest.
+            receive(link, left, {"gamepad": AT_REST}, page="b")
+        drive(linked, 1)
+    assert not linked.last.rates.any()
+    assert reasons == [SILENT]
+    for _ in range(300):
+        clock.now += 0.01
+        drive(linked, 1)
+        assert not linked.last.rates.any()
+
+
+@pytest.mark.parametrize("hand", HANDS)
+def test_the_arm_rests_at_once_when_the_page_of_the_hand_is_closed(linked, link, clock, hand):
+    receive(link, 1, {"gamepad": AT_REST} if hand == "gamepad" else {})
+    drive(linked, 2)
+    receive(link, 2, HANDS[hand])
+    drive(linked, 10)
+    assert linked.last.rates.any()
+    receive(link, 3, {"leaves": True})
+    # Joint rates change by 0.1 rad/s in a step.
+    drive(linked, 1 + int(np.abs(linked.last.rates).max() / 0.1) + 1)
+    assert not linked.last.rates.any()
+
+
+def test_what_a_page_that_is_heard_reads_is_not_that_none_is_connected(linked, link, clock):
+    drive(linked, 5)
+    linked.show()
+    number = {"page": "a", "number": 1, "held": [], "clicks": {}}
+    assert link.receive(number)["message"] == ""
+    drive(linked, 1)
+    linked.show()
+    assert link.receive({**number, "number": 2})["message"] == ""
+
+
+@pytest.fixture
+def late(meshcat, iiwa_display, iiwa, ready, reasons, desk, link):
     """A live page with a latency of five periods each way."""
     found = LivePage(
         meshcat, iiwa_display, iiwa, ready, settings=Settings(), modes=MODES,
-        latency=Latency(0.05), on_stop=reasons.append,
+        latency=Latency(0.05), link=link, on_stop=reasons.append,
     )  # fmt: skip
     found.operator.source = desk
     return found
@@ -113,10 +188,10 @@ def test_a_lost_browser_is_reported_once_and_recorded_as_a_stop(page, desk, reas
 
 
 def test_a_message_stays_visible_for_a_while(page, desk):
-    desk.watched = False
+    desk.silent = True
     drive(page, 1)
     reason = page.last.reason
-    desk.watched = True
+    desk.silent = False
     drive(page, 1)
     assert page.last.reason == ""
     begun = page._message_until
@@ -144,11 +219,11 @@ def test_a_stretched_arm_turns_the_bars_magenta(page, desk, iiwa):
     assert "singular" in page.message(page._message_until + 1.0)
 
 
-def test_recording_begins_when_a_browser_connects(meshcat, iiwa_display, iiwa, ready, desk):
+def test_recording_begins_when_a_browser_connects(meshcat, iiwa_display, iiwa, ready, desk, link):
     recorder = Recorder(iiwa)
     page = LivePage(
         meshcat, iiwa_display, iiwa, ready, settings=Settings(), modes=MODES,
-        on_stop=lambda _: None, on_step=recorder.add,
+        link=link, on_stop=lambda _: None, on_step=recorder.add,
     )  # fmt: skip
     page.operator.source = desk
     desk.watched = False
@@ -178,14 +253,43 @@ def test_recorder_gives_what_it_was_given(iiwa, ready, driven, monkeypatch):
         np.testing.assert_array_equal(getattr(run, name), getattr(whole, name), err_msg=name)
 
 
-def test_the_page_has_all_its_controls(page, meshcat):
-    names = {f"{name} ({key_name(key)})" for name, key in buttons(4).items()}
-    assert set(meshcat.GetButtonNames()) >= names
-    assert set(meshcat.GetSliderNames()) >= set(sliders())
+def frame(content):
+    """Return a message of a browser to a socket, of up to 65,535 bytes."""
+    mask = bytes(4)
+    return b"\x82\xfe" + len(content).to_bytes(2, "big") + mask + content
+
+
+def test_nothing_that_is_sent_to_meshcat_moves_the_arm(linked, meshcat, link, ready):
+    msgpack = pytest.importorskip("msgpack")
+    live = linked
+    assert meshcat.GetSliderNames() == meshcat.GetButtonNames() == []
+    # What any page in the browser can send to Meshcat's socket.
+    with socket.create_connection(("localhost", meshcat.port()), timeout=10) as foreign:
+        foreign.sendall(
+            f"GET / HTTP/1.1\r\nHost: localhost:{meshcat.port()}\r\n"
+            "Origin: http://evil.example\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+            "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+            "Sec-WebSocket-Version: 13\r\n\r\n".encode()
+        )
+        foreign.recv(65536)
+        for pad in (AT_REST, PUSHED):
+            for message in (
+                {"type": "button", "name": "ahead (W)"},
+                {"type": "slider", "name": FORWARD, "value": 0.25},
+                {"type": "gamepad", "name": "", "gamepad": pad},
+            ):
+                foreign.sendall(frame(msgpack.packb(message)))
+            end = time.monotonic() + 10.0
+            while list(meshcat.GetGamepad().axes) != pad["axes"]:
+                assert time.monotonic() < end
+                time.sleep(0.01)
+            receive(link, 1, {})
+            drive(live, 30)
+    np.testing.assert_array_equal(live.last.joints, ready)
 
 
 @pytest.mark.parametrize("name", ["iiwa7", "pr2", "pr2_right", "tiago", "panda"])
-def test_start_postures_are_collision_free_and_allow_motion(name, meshcat):
+def test_start_postures_are_collision_free_and_allow_motion(name, meshcat, link):
     arm = load_arm(name, torso_height=0.1)
     display = RobotDisplay(arm, meshes=False)
     start = start_posture(arm, display)
@@ -194,8 +298,9 @@ def test_start_postures_are_collision_free_and_allow_motion(name, meshcat):
     assert display.contacts() is None
     np.testing.assert_array_equal(start, start_posture(arm, display))
     page = LivePage(
-        meshcat, display, arm, start, settings=Settings(), modes=MODES, on_stop=lambda _: None
-    )
+        meshcat, display, arm, start, settings=Settings(), modes=MODES, link=link,
+        on_stop=lambda _: None,
+    )  # fmt: skip
     before = page.last.p.copy()
     assert before[0] > arm.frames[0, 0, 3]
     assert not page.last.singular

@@ -15,6 +15,7 @@ from tcs.output.view.teleop.session import LiveOptions, LiveSession
 from tcs.teleop.runs.files import load_run
 from tests.app.test_browser import AXE, RUN_AXE
 from tests.output.view.browser import chromium
+from tests.output.view.teleop.test_browser import SLIDE
 
 pytestmark = pytest.mark.slow
 SIZES = [(1440, 900), (390, 844)]
@@ -93,8 +94,8 @@ def test_a_key_moves_the_arm_until_it_is_released_and_is_lit(page, browser):
     assert at_rest(page)
     assert browser.driver.execute_script(PRESSED) == []
     assert browser.complaints() == []
-    ours = tuple(f"http://localhost:{part}" for part in ("7", "8"))
-    assert [name for name in browser.fetched() if not name.startswith((*ours, "data:"))] == []
+    ours = (page.url, "data:")
+    assert [name for name in browser.fetched() if not name.startswith(ours)] == []
 
 
 @pytest.mark.parametrize("how", ["blur", "closed"])
@@ -110,7 +111,7 @@ def test_a_page_that_is_left_releases_its_keys(page, browser, how):
 
 
 def test_a_page_that_is_left_stops_what_its_sliders_move(page, browser):
-    browser.driver.execute_script("viewer.gui_controllers['move y [m/s]'].setValue(0.1)")
+    browser.driver.execute_script(SLIDE, "move y [m/s]", 0.1)
     before = page.page.last.p.copy()
     until(page, lambda: (page.page.last.p - before)[1] > 0.01)
     browser.driver.get("about:blank")
@@ -203,7 +204,8 @@ def test_modes_are_switched_and_bars_say_their_state(page, browser):
         key(browser, "KeyM", False)
         page.page.run(0.2)
     key(browser, "KeyF", True)
-    until(page, lambda: page.page.last.limits.any())
+    # On a machine that is slow to draw, the arm pauses between messages.
+    until(page, lambda: page.page.last.limits.any(), patience=120.0)
     page.page.run(0.5)
     limited = np.flatnonzero(page.page.last.limits)
     shown = browser.driver.execute_script(BARS)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import re
 import socket
+import urllib.request
 from http.client import HTTPConnection
 
 import pytest
 
 from tcs.errors import OutputError
 from tcs.output.view.teleop import operator_page
-from tcs.output.view.teleop.controls import buttons
+from tcs.output.view.teleop.controls import buttons, sliders
 from tcs.output.view.teleop.operator_page import OperatorPage, desk_of, operator_html
 from tcs.output.view.teleop.page_link import PageLink
 from tcs.teleop import Settings
@@ -23,13 +24,9 @@ def pictures():
 
 
 @pytest.fixture
-def link():
-    return PageLink(buttons(4))
-
-
-@pytest.fixture
-def served(pictures, link):
-    found = OperatorPage("<html>driving</html>", lambda: pictures, link)
+def served(pictures, link, meshcat):
+    scene = ("localhost", meshcat.port())
+    found = OperatorPage("<html>driving</html>", lambda: pictures, link, scene)
     yield found
     found.close()
 
@@ -66,7 +63,7 @@ def test_an_occupied_port_is_refused():
         taken.listen()
         port = taken.getsockname()[1]
         with pytest.raises(OutputError, match=f"port {port}"):
-            OperatorPage("", dict, PageLink({}), port)
+            OperatorPage("", dict, PageLink({}, {}), ("localhost", 1), port)
 
 
 def test_keys_arrive_and_the_readout_returns(served, link):
@@ -74,8 +71,8 @@ def test_keys_arrive_and_the_readout_returns(served, link):
     status, _, content = got(served, "/link", "POST", json.dumps(message))
     assert status == 200
     assert json.loads(content)["mode"] == ""
-    assert link.held() == {"ahead"}
-    assert link.clicks()["next mode"] == 1
+    assert link.read().held == {"ahead"}
+    assert link.read().clicks["next mode"] == 1
 
 
 @pytest.mark.parametrize(
@@ -83,7 +80,7 @@ def test_keys_arrive_and_the_readout_returns(served, link):
 )
 def test_other_messages_are_refused(served, link, content):
     assert got(served, "/link", "POST", content)[0] == 400
-    assert link.held() == set()
+    assert link.read().held == set()
 
 
 def test_pages_of_other_servers_cannot_drive(served, link):
@@ -92,14 +89,19 @@ def test_pages_of_other_servers_cannot_drive(served, link):
     assert got(served, "/link", "POST", message, Origin="http://evil.example")[0] == 403
     assert got(served, "/link", "POST", message, Host="evil.example:7100")[0] == 403
     assert got(served, "/", Host="evil.example")[0] == 403
-    assert link.held() == set()
+    assert got(served, "/link", "POST", message, Host="localhost:1")[0] == 403
+    for site in ("cross-site", "same-site"):
+        # A picture or a frame in a page of elsewhere has no origin.
+        assert got(served, "/camera/0", **{"Sec-Fetch-Site": site})[0] == 403
+        assert got(served, "/link", "POST", message, **{"Sec-Fetch-Site": site})[0] == 403
+    assert link.read().held == set()
     assert got(served, "/link", "POST", message, Host=host, Origin=f"http://{host}")[0] == 200
-    assert link.held() == {"ahead"}
+    assert link.read().held == {"ahead"}
 
 
 def test_the_page_names_every_key_and_joint(iiwa):
     groups = Settings().groups
-    desk = desk_of(iiwa, groups)
+    desk = desk_of(iiwa, groups, sliders())
     assert {key["code"] for key in desk["keys"]} == set(buttons(len(groups)).values())
     assert {key["code"] for key in desk["keys"] if not key["hold"]} == {
         *("KeyM", "KeyC", "Space", "KeyX"), *(f"Digit{i + 1}" for i in range(len(groups))),
@@ -108,19 +110,53 @@ def test_the_page_names_every_key_and_joint(iiwa):
     assert all(joint["bounded"] for joint in desk["joints"])
 
 
-def test_the_page_is_that_of_meshcat_and_loads_nothing_from_elsewhere(meshcat):
+def test_the_page_is_that_of_meshcat_and_loads_nothing_from_elsewhere(served):
     desk = {"title": "A <robot>", "keys": [{"name": "</script>"}]}
-    page = operator_html(meshcat.port(), desk, cameras=True, xr=True)
-    here = f"http://localhost:{meshcat.port()}/"
-    assert f'src="{here}' in page
-    assert f'url = "{here}";' in page
+    page = operator_html(desk, cameras=True, xr=True)
     assert "showCameras" in page
     assert "<title>A &lt;robot&gt;</title>" in page
     assert page.count("</script>") == page.count("<script")
-    assert all(one.startswith(here) for one in re.findall(r'(?:src|href)="([^"]*)"', page))
+    assert re.findall(r'(?:src|href)="([^"]*)"', page) == ["meshcat.js"]
+    assert got(served, "/meshcat.js")[0] == 200
 
 
-def test_a_page_of_another_form_is_refused(meshcat, monkeypatch):
-    monkeypatch.setattr(operator_page, "_page_of_meshcat", lambda port: "<html></html>")
+def test_a_page_of_another_form_is_refused(monkeypatch):
+    monkeypatch.setattr(operator_page, "_part_of_meshcat", lambda name: b"<html></html>")
     with pytest.raises(OutputError, match="cannot be extended"):
-        operator_html(meshcat.port(), {}, cameras=True, xr=True)
+        operator_html({}, cameras=True, xr=True)
+
+
+def opened(page, origin, host=None):
+    """Open the page's socket to the scene as a browser does; return it, and what it says first."""
+    at = page.url.removeprefix("http://").strip("/")
+    found = socket.create_connection(("127.0.0.1", int(at.rpartition(":")[2])), timeout=10)
+    found.sendall(
+        f"GET / HTTP/1.1\r\nHost: {host or at}\r\nOrigin: {origin}\r\nUpgrade: websocket\r\n"
+        "Connection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+        "Sec-WebSocket-Version: 13\r\n\r\n".encode()
+    )
+    return found, found.recv(65536)
+
+
+def test_the_scene_is_open_to_its_own_page_only(served, meshcat):
+    own = served.url.strip("/")
+    foreign = ("http://evil.example", "null", f"http://localhost:{meshcat.port()}")
+    for origin, host in (*((one, None) for one in foreign), (own, "evil.example")):
+        socket_, reply = opened(served, origin, host)
+        with socket_:
+            assert reply.startswith(b"HTTP/1.1 403 ")
+    assert meshcat.GetNumActiveConnections() == 0
+    socket_, reply = opened(served, own)
+    with socket_:
+        assert reply.startswith(b"HTTP/1.1 101 ")
+        assert meshcat.GetNumActiveConnections() == 1
+
+
+def test_the_page_can_be_in_no_frame(served):
+    with urllib.request.urlopen(served.url) as reply:
+        policy = reply.headers["Content-Security-Policy"]
+    assert policy.startswith("default-src 'none'; ")
+    assert "frame-ancestors 'none'" in policy
+    host = served.url.removeprefix("http://").strip("/")
+    assert f"connect-src 'self' ws://{host} data: blob:;" in policy
+    assert "eval" not in policy
