@@ -29,6 +29,23 @@ import("/app/texts.js").then(found =>
   done(bodies.map(one => found.bodyName(one, name => name === "wall"))));
 """
 
+CARDS = """
+const done = arguments[0];
+import("/app/panels.js").then(({showCards}) => {
+  const one = {members: [{}], reachability: 1, manipulability: 0.346, moves: [], cost: 0.08};
+  const sure = {success: 0.92, success_ci95: [0.9, 0.94]};
+  const two = {...one, ...sure, members: [{}, {}], manipulability: 0.348};
+  const fewer = {...one, success: 0.32};
+  showCards([{...two, basis: "success", fewer}, {...one, cost: 0}], () => {}, () => {});
+  const texts = card => [...card.children].map(part => part.textContent);
+  done([...document.querySelectorAll("#cards .card")].map(texts));
+});
+"""
+REACHED = """
+return [...document.querySelectorAll("#goals li")].filter(one => one.querySelector(".yes"))
+  .map(one => one.querySelector(".name").firstChild.textContent);
+"""
+
 AXE = Path(__file__).parents[2] / "node_modules" / "axe-core" / "axe.min.js"
 RUN_AXE = """
 const done = arguments[arguments.length - 1];
@@ -129,6 +146,39 @@ def test_a_click_moves_the_robot_and_why_explains(page):
     script("arguments[0].click()", why[0])
     page.wait(lambda: not script("return document.getElementById('why').hidden"))
     assert script("return document.activeElement.id") == "why"
+
+
+def test_a_card_says_why_it_is_recommended_and_how_long_it_takes(page):
+    first, second = page.driver.execute_async_script(CARDS)
+    assert first[:4] == [
+        "2 places: 100 %",
+        "Recommended: the most robust",
+        "2 places instead of 1: success under error 92.0 % instead of 32.0 %, dexterity 0.348 "
+        "instead of 0.346.",
+        "0.1 m to drive: 1 s at 0.2 m/s, without turning",
+    ]
+    assert second[:2] == ["One place: 100 %", "nothing to drive"]
+
+
+def test_no_click_loses_a_goal_without_a_word(page):
+    script = page.driver.execute_script
+    buttons = "return document.querySelectorAll('#goals li button:last-child')"
+    address = script("return location.href")
+    for number in range(len(script(buttons))):
+        page.driver.get("about:blank")
+        page.driver.get(address)
+        page.wait(lambda: len(script(buttons)) > 0)
+        before, pose = script(REACHED), script(POSE)
+        script("arguments[0].click()", script(buttons)[number])
+        asks = "return !document.getElementById('why').hidden"
+        page.wait(lambda: script(asks) or script(POSE) != pose)  # noqa: B023
+        if script(asks):
+            assert "It no longer reaches" in script(
+                "return document.getElementById('why').innerText"
+            )
+            assert script(REACHED) == before
+        else:
+            page.wait(lambda: set(script(REACHED)) > set(before))  # noqa: B023
 
 
 def scored_again(page, do):
