@@ -224,7 +224,7 @@ WRONG = {
     ),
     "package not there": (
         change("urdf", "package://no_such_robot/a.urdf"),
-        "'no_such_robot' is neither installed nor a folder above",
+        "'no_such_robot' is neither installed, nor in ROS_PACKAGE_PATH",
     ),
     "primitives not there": (
         change("primitives", "nowhere.csv"),

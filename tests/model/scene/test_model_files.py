@@ -94,7 +94,7 @@ def test_no_furniture_is_so_large_or_so_far(written, old, new, name, number):
         ("<lower>-1.5", "<lower>-2000", "a number of 'lower' is -2000"),
         ("0.1 0.2 0.6", "0.1 0 0.6", "a number of 'size' is 0"),
         ('link name="lid"', 'link name="world"', "a link is named 'world'"),
-        ("sdf", b"\xff\xfes\x00d\x00f\x00", "is not a text file in UTF-8"),
+        ("sdf", b"\xff\xfes\x00d\x00f\x00", "is not valid XML"),
         ("<sdf", "<sdf <", "is not valid XML"),
         ("<sdf", '<?xml version="1.0" encoding="x-none"?><sdf', "declares an encoding"),
     ],
