@@ -18,7 +18,7 @@ FILE = "shaving-wheelchair-pr2.tcs"
 COMMANDS = {
     "score": "score shaving --environment wheelchair",
     "select": f"select {FILE} --here 1.4 -1.2 180",
-    "explain": f"explain {FILE} --goal 6 --here 1.1 0.7 180",
+    "explain": f"explain {FILE} --goal 7 --here 1.1 0.7 180",
     "verify": f"verify {FILE}",
     "evaluate": f"evaluate {FILE}",
 }

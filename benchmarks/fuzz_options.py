@@ -96,7 +96,7 @@ COMMANDS = (
     Command("list"),
     Command("score", ("task.yaml",), (*_THREE, "--out", "out.tcs", "--jobs", "1")),
     Command("select", ("scores.tcs",), ("--here", "0", "0", "0")),
-    Command("explain", ("scores.tcs",), ("--goal", "0")),
+    Command("explain", ("scores.tcs",), ("--goal", "1")),
     Command("verify", ("scores.tcs",), ("--pairs", "2", "--dense", "0", "--jobs", "1")),
     Command("export", ("scores.tcs",), ("--out", "out.csv")),
     Command("evaluate", ("scores.tcs",), ("--samples", "4", "--jobs", "1")),

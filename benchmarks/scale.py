@@ -31,7 +31,7 @@ LIFT = 0.3
 HERE = ("--here", "1.4", "-1.2", "180")
 COMMANDS = {
     "select": ("select", "{file}", *HERE),
-    "explain": ("explain", "{file}", "--goal", "6", "--here", "1.1", "0.7", "180"),
+    "explain": ("explain", "{file}", "--goal", "7", "--here", "1.1", "0.7", "180"),
     "map": ("map", "{file}", "--out", "map.png"),
     "evaluate": ("evaluate", "{file}", "--samples", "100"),
     "verify": ("verify", "{file}", "--pairs", "100", "--dense", "20"),

@@ -19,7 +19,7 @@ def main() -> None:
         found = tcs.explain(file, goal, here)
         explained = found.explained
         assert explained is not None  # It is None only if no configuration is given.
-        line = f"goal {goal}: {explained.reason.name.lower()}"
+        line = f"goal {goal + 1}: {explained.reason.name.lower()}"
         if explained.pair is not None:
             line += f", {explained.pair[0]} would touch {explained.pair[1]}"
         # The cheapest change to a configuration that reaches the goal, as a sentence.

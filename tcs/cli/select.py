@@ -183,7 +183,9 @@ def _weights(**given: float | None) -> UtilityWeights | None:
 def explain(
     file: options.File,
     *,
-    goal: Annotated[int, typer.Option(help="Number of the goal, from 0.", show_default=False)],
+    goal: Annotated[
+        str, typer.Option(help="Name of the goal, or its number, from 1.", show_default=False)
+    ],
     configuration: Annotated[
         int | None,
         typer.Option(
@@ -229,13 +231,13 @@ def explain(
     from tcs.cli.values import current_state, frame_values, observed_settings
     from tcs.model.grid import Grid
     from tcs.output.terminal.explanations import report_explanation
-    from tcs.output.words import explanation_in_words
+    from tcs.output.words import explanation_in_words, goal_index_of_number
     from tcs.placement.reasons import fix_weights
 
     loaded = tcs.load(file)
     explanation = tcs.explain(
         loaded,
-        goal,
+        goal_index_of_number(loaded, goal),
         configuration
         if here is None
         else dataclasses.replace(current_state(here, torso, at or ()), arm=arm),

@@ -11,10 +11,30 @@ from typing import Any
 
 from tcs.errors import DataFileError
 from tcs.files.documents import read_mapping
-from tcs.files.paths import data_folder
+from tcs.files.paths import DataFiles, data_folder
 
 _BASED_ON = "based_on"
 """Key of an environment file: the environment that supplies the keys this file lacks."""
+
+
+def check_names(task: str | None, environment: str, robot: str) -> None:
+    """Check that a task, an environment and a robot of these names are included.
+
+    Args:
+        task: Name of a task, None for one that is given otherwise.
+        environment: Name of an environment.
+        robot: Name of a robot.
+
+    Raises:
+        UnknownNameError: If one is not.
+    """
+    folders = ("task", "tasks/*/*.yaml"), ("environment", "models/beds_wheelchairs/*.yaml")
+    names = (task, environment, robot)
+    for name, (noun, pattern) in zip(
+        names, (*folders, ("robot", "models/robots/*.yaml")), strict=True
+    ):
+        if name is not None:
+            DataFiles(noun, pattern).path(name)
 
 
 def catalogue() -> dict[str, list[dict[str, Any]]]:

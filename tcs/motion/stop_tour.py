@@ -85,7 +85,7 @@ class _Tour:
         if found.found:
             self.found[goal] = found
             return
-        self.fail(goal, found.reason, found.pair, f"approach of goal {goal}", begun)
+        self.fail(goal, found.reason, found.pair, f"approach of goal {goal + 1}", begun)
 
     def order(self, through: Callable[..., Sequence[tuple[int, int]]]) -> list[tuple[int, Access]]:
         """Return the goals in the order of a tour in joint time, each with a posture.
@@ -108,7 +108,7 @@ class _Tour:
     def visit(self, goal: int, access: Access) -> None:
         """Append the motions to a goal, in and out, or note that there are none."""
         begun = time.perf_counter()
-        here = "rest" if self.goal is None else f"goal {self.goal}"
+        here = "rest" if self.goal is None else f"goal {self.goal + 1}"
         self.stop.forget_contacts()
         chosen, path = access, self._path(access.begin[None])
         if path is None:
@@ -119,14 +119,14 @@ class _Tour:
         moves = None if path is None else self._timed_path(path[0])
         if path is None or moves is None:
             pair = self.stop.most_frequent_contact()
-            self.fail(goal, "no_path", pair, f"{here} to goal {goal}", begun)
+            self.fail(goal, "no_path", pair, f"{here} to goal {goal + 1}", begun)
             return
         # Joints without limits may have arrived full turns away.
         offset = path[0][-1] - chosen.begin
         approach = self._timed_line(chosen.approach.shifted(offset))
         retreat = self._timed_line(chosen.retreat.shifted(offset))
         if approach is None or retreat is None:
-            self.fail(goal, "approach_limits", None, f"approach of goal {goal}", begun)
+            self.fail(goal, "approach_limits", None, f"approach of goal {goal + 1}", begun)
             return
         self._append("move", self.goal, goal, moves)
         self._append("approach", goal, goal, approach)

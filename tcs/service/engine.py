@@ -12,8 +12,9 @@ from tcs.errors import EnvironmentFileError, ServiceError, TcsError, UnknownName
 from tcs.files.documents import checked
 from tcs.files.json_values import without_infinities
 from tcs.files.writing import scratch_folder
-from tcs.model.catalogue import catalogue
-from tcs.output.words import choice_in_words, explanation_in_words
+from tcs.kernel.dexterity import dexterity
+from tcs.model.catalogue import catalogue, check_names
+from tcs.output.words import choice_in_words, explanation_in_words, goal_index
 from tcs.placement.constraints import scored_entries
 from tcs.placement.reasons import explain, fix_weights
 from tcs.placement.selection import Executability, Top, select
@@ -245,7 +246,7 @@ class Engine:
             file = self._files.loaded(request.file)
             explanation = explain(
                 file,
-                request.goal,
+                goal_index(file, request.goal),
                 request.configuration
                 if request.here is None
                 else state_of(request.here, request.torso, request.at, request.arm),
@@ -298,7 +299,8 @@ class Engine:
         file = self._files.for_scene(request.file)
         stated = state_of(request.here, request.torso, request.at)
         import_heavy()
-        return self._postures.at(request.file, file, stated, goal=request.goal, arm=request.arm)
+        goal = None if request.goal is None else goal_index(file, request.goal)
+        return self._postures.at(request.file, file, stated, goal=goal, arm=request.arm)
 
     def submit(self, request: JobRequest) -> JobStatus:
         """Queue a job, and return its state.
@@ -306,6 +308,7 @@ class Engine:
         Raises:
             BusyError: If the queue is full.
             NotFoundError: If the score file is not held.
+            UnknownNameError: If a task, environment, robot or measure of that name does not exist.
         """
         what, work = self._work_of(request)
         return self._jobs.submit(what, work)
@@ -362,6 +365,8 @@ class Engine:
             return self._work_with_file(request)
         if (request.task is None) == (request.task_yaml is None):
             raise ServiceError("give 'task' or 'task_yaml', and not both.")
+        check_names(request.task, request.environment, request.robot)
+        dexterity(request.measure)
         if isinstance(request, ScoreHereRequest):
             work = partial(self._work.score_here, request)
             return "score-here", self._plainly(work, import_scoring)

@@ -246,7 +246,7 @@ def _goal(file: ScoreFile, scores: ScoreTable, rows: Any, goal: int) -> dict[str
     frames = [text_of_goal(file.task, other, "body_frame") for other in range(goal + 1)]
     return {
         "goal": goal,
-        "name": goal_names(file.task, goal + 1)[goal] or f"goal {goal}",
+        "name": goal_names(file.task, goal + 1)[goal] or f"goal {goal + 1}",
         "given_name": text_of_goal(file.task, goal, "name"),
         "body_frame": frames[goal],
         "place": frames.count(frames[goal]),

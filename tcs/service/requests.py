@@ -17,6 +17,8 @@ FileId = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$", description="SHA-256 of
 CatalogueName = Annotated[str, Field(pattern=r"^[_A-Za-z0-9-]{1,80}$")]
 """Name of a task, an environment or a robot; never a path."""
 Text = Annotated[str, Field(max_length=1000)]
+Goal = Annotated[int, Field(strict=True, ge=0)] | Text
+"""Index of a goal, from 0, or its name."""
 YamlText = Annotated[str, Field(max_length=1024**2)]
 BasePose = tuple[Number, Number, Number]
 """x [m], y [m] and heading [deg] in the environment frame."""
@@ -87,7 +89,7 @@ class ExplainRequest(TravelCosts, Observed, State):
     """Explain why a goal is not reached, and find the cheapest change, as `tcs explain`."""
 
     file: FileId
-    goal: Annotated[int, Field(strict=True, ge=0)]
+    goal: Goal
     configuration: Annotated[int, Field(strict=True, ge=0)] | None = None
     here: BasePose | None = None
     arm: Text | None = None
@@ -116,7 +118,7 @@ class PostureRequest(State):
 
     file: FileId
     here: BasePose
-    goal: Annotated[int, Field(strict=True, ge=0)] | None = None
+    goal: Goal | None = None
     """The goal that the arm is at; the one of greatest dexterity by default."""
     arm: Annotated[list[Annotated[list[Number], Field(max_length=20)]], Field(max_length=1500)] = (
         Field(default_factory=list)

@@ -37,11 +37,11 @@ def test_table_names_the_arm(tcs_command, both, tmp_path):
 
 
 def test_a_goal_is_explained_for_an_arm(tcs_command, both):
-    words = ("explain", both, "--goal", 0, "--here", 1.05, -0.7, 180, "--torso", 0.3)
+    words = ("explain", both, "--goal", 1, "--here", 1.05, -0.7, 180, "--torso", 0.3)
     for arm in ("left", "right"):
         ran = tcs_command(*words, "--arm", arm, "--json")
         assert ran.json["explained"]["members"][0]["arm"] == arm
-    assert tcs_command("explain", both, "--goal", 0, "--arm", "left").code == 2
+    assert tcs_command("explain", both, "--goal", 1, "--arm", "left").code == 2
 
 
 def test_answers_are_confirmed_by_drake(tcs_command, both):

@@ -41,7 +41,7 @@ def base(tmp_path, monkeypatch, small_file):
     save_probability_map(tmp_path / "discs.apm", query(model()).map)
     return {
         "select": [small_file, "--here", "1", "0.3", "180"],
-        "explain": [small_file, "--goal", "0"],
+        "explain": [small_file, "--goal", "1"],
         "export": [small_file, "--out", "out.csv"],
         "map": [small_file, "--out", "map.png"],
         "capability show": ["map.tcm", "--out", "layer.png"],

@@ -127,7 +127,7 @@ def test_constraints_when_scoring(tcs_command, corner, tmp_path):
         "select", path, *here
     ).out.replace("\n", " ")
     excluded = int(np.flatnonzero(file.nominal.scores.reason[:, 0] == 7)[0])
-    out = tcs_command("explain", path, "--goal", 0, "--configuration", excluded).out
+    out = tcs_command("explain", path, "--goal", 1, "--configuration", excluded).out
     assert "excluded by a constraint when scoring" in out
     assert tcs_command("map", path, "--out", tmp_path / "map.png").code == 0
 
@@ -432,11 +432,11 @@ def test_scoring_with_approach(tcs_command, corner, tmp_path):
     assert file.metadata["approach"] == {"tool_speed": 0.1}
     assert file.task["goals"][0]["approach"] == {"direction": [1.0, 0.0, 0.0], "distance": 0.1}
     h, g = np.argwhere(after.reason >= 8)[0]
-    told = tcs_command("explain", path, "--goal", g, "--configuration", h, "--json").json
+    told = tcs_command("explain", path, "--goal", g + 1, "--configuration", h, "--json").json
     assert told["explained"]["reason"].startswith("approach_")
     checks = [check["reason"] for check in told["checks"]]
     assert checks[-2:] == ["approach_limits", "approach_blocked"]
-    assert "approach" in tcs_command("explain", path, "--goal", g, "--configuration", h).out
+    assert "approach" in tcs_command("explain", path, "--goal", g + 1, "--configuration", h).out
     chosen = tcs_command(*words, "--approach", "--out", tmp_path / "chosen.tcs").json
     assert chosen["reasons"] == result["reasons"]
 

@@ -236,7 +236,7 @@ def test_limbs_observed_one_by_one(tcs_command, tmp_path):
     ]
     shown = tcs_command(*words, "arm_left=1,-0.04,0.7").out
     assert "goals on arm left also as scored for person y -0.05 m, 0.010 m from it" in shown
-    words = ("explain", path, "--goal", 3, *words[6:])
+    words = ("explain", path, "--goal", 4, *words[6:])
     explained = tcs_command(*words, "arm_left=1,-0.04,0.7")
     assert "Goals on arm left also as scored for person y -0.05 m" in explained.out
     ran = tcs_command(*words, "arm_right=1,-0.04,0.7")

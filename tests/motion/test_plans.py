@@ -73,7 +73,7 @@ def test_goals_that_cannot_be_done_say_why(planned):
     done, limited = planned.results
     assert done.done
     assert (limited.done, limited.reason) == (False, "approach_limits")
-    assert limited.segment == "approach of goal 1"
+    assert limited.segment == "approach of goal 2"
     assert planned.goals_done == 1
 
 
@@ -156,8 +156,8 @@ def test_other_formats_and_configurations_are_refused(planned, two_goals, tcs_pl
 def test_the_text_names_motions_and_reasons(planned, capsys):
     report_plan(planned.to_json())
     text = capsys.readouterr().out
-    assert re.search(r"approach +goal 0 +goal 0", text)
-    assert "goal 1: joint or velocity limits prevent its approach" in text
+    assert re.search(r"approach +goal 1 +goal 1", text)
+    assert "goal 2: joint or velocity limits prevent its approach" in text
     assert "1 of 2 goals done (2 reached by a posture)" in text
 
 

@@ -52,12 +52,12 @@ def test_the_section_lists_every_segment_and_every_failure(measured, planned):
     assert isinstance(table, Table)
     texts = table.texts()
     assert [row[0] for row in texts] == ["move", "approach", "retreat", "move"]
-    assert texts[0][1:3] == ["rest", "goal 0, head"]
+    assert texts[0][1:3] == ["rest", "goal 1, head"]
     np.testing.assert_allclose(
         sum(float(row[3]) for row in texts), planned.stops[0].duration, atol=0.3
     )
     assert isinstance(failures, Bullets)
-    assert failures.items[0].startswith("goal 1: joint or velocity limits prevent its approach")
+    assert failures.items[0].startswith("goal 2: joint or velocity limits prevent its approach")
 
 
 def test_the_command_plans_the_set_that_it_shows(planned, two_goals, monkeypatch, tmp_path):

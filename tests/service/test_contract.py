@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import json
 import threading
@@ -29,7 +30,9 @@ from tcs.service import (
     OutcomeRequest,
     PlanRequest,
     PopulationRequest,
+    PostureRequest,
     RefineRequest,
+    ScoreHereRequest,
     ScoreRequest,
     SelectRequest,
 )
@@ -44,6 +47,13 @@ from tests.placement.store.example import METADATA, score_file
 from tests.service.ros2_peer import ros2_peers
 
 HERE = (1.4, -1.2, 180.0)
+
+
+def raised(name, detail):
+    """Return the error of a class; one of a name that is unknown takes more than its text."""
+    return (TcsError if name == "UnknownNameError" else getattr(tcs.errors, name))(detail)
+
+
 AT = {"bed_height": 0.0}
 UNKNOWN = "0" * 64
 
@@ -124,7 +134,7 @@ class Assistant(ByName):
         content = json.loads(result.content[0].text)
         if result.is_error:
             assert "\n" not in content["detail"]
-            raise getattr(tcs.errors, content["title"])(content["detail"])
+            raise raised(content["title"], content["detail"])
         return content
 
 
@@ -139,7 +149,7 @@ class Ros(ByName):
         response = self._call(name, json.dumps(given))
         if not response.success:
             assert "\n" not in response.detail
-            raise getattr(tcs.errors, response.error)(response.detail)
+            raise raised(response.error, response.detail)
         return json.loads(response.answer)
 
 
@@ -239,7 +249,7 @@ def test_select_has_the_keys_of_the_command(service, file, content, tcs_json):
 
 def test_explain_has_the_keys_of_the_command(service, file, tcs_json):
     answer = service.explain(ExplainRequest(file=file, goal=2, configuration=7))
-    assert answer == tcs_json("explain", "--goal", 2, "--configuration", 7)
+    assert answer == tcs_json("explain", "--goal", 3, "--configuration", 7)
 
 
 def test_floor_has_the_scores_of_the_table(service, file):
@@ -397,6 +407,40 @@ def test_failed_job_has_one_line(service, tmp_path):
         assert "\n" not in status.problem
     with pytest.raises(TcsError, match="'task' or 'task_yaml'"):
         service.submit(ScoreRequest())
+
+
+@pytest.mark.parametrize(
+    ("fields", "problem"),
+    [
+        ({"task": "shavign"}, "unknown task 'shavign'.*Did you mean 'shaving'"),
+        ({"task": "shaving", "environment": "wheelchir"}, "unknown environment 'wheelchir'"),
+        ({"task": "shaving", "robot": "pr3"}, "unknown robot 'pr3'"),
+        ({"task": "shaving", "measure": "isotropi"}, "isotropi"),
+        ({"task_yaml": "name: x", "robot": "pr3"}, "unknown robot 'pr3'"),
+    ],
+)
+@pytest.mark.parametrize("request_of", [ScoreRequest, ScoreHereRequest])
+def test_a_wrong_name_in_a_job_is_refused_when_it_is_sent(service, request_of, fields, problem):
+    before = len(service.jobs())
+    with pytest.raises(TcsError, match=problem):
+        service.submit(request_of(**fields))
+    assert len(service.jobs()) == before
+
+
+def test_goals_are_named_by_index_or_name(service, tmp_path):
+    named = score_file()
+    goals = [{"name": f"spot {letter}", "body_frame": "head"} for letter in "abcde"]
+    path = tmp_path / "named.tcs"
+    save_scores(path, dataclasses.replace(named, task={**named.task, "goals": goals}))
+    file = service.add_file(path.read_bytes()).file
+    by_index, by_name = (
+        service.explain(ExplainRequest(file=file, goal=goal)) for goal in (2, "spot c")
+    )
+    assert by_index == by_name
+    for request, ask in ((ExplainRequest, service.explain), (PostureRequest, service.posture)):
+        rest = {"here": HERE} if request is PostureRequest else {}
+        with pytest.raises(TcsError, match="unknown goal 'spot z'"):
+            ask(request(file=file, goal="spot z", **rest))
 
 
 def test_sent_documents_open_no_path(service):

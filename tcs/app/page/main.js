@@ -19,7 +19,7 @@ const PERSONS = {
 const SETTLED = 350; // time after the last change at which places are suggested [ms]
 const SIZES = [1, 2];
 
-const page = { files: [], torso: 0, outcome: null, asked: 0, suggesting: 0, known: null, own: {}, rescored: new Set() };
+const page = { files: [], torso: 0, outcome: null, why: null, asked: 0, suggesting: 0, known: null, own: {}, rescored: new Set() };
 // What is shown: a score file, its floors by state, the state, and its scene. `whole` has every state, with the changes of the scene.
 let [view, whole] = [shownFile(null, 0), shownFile(null, 0)];
 const things = new Things();
@@ -387,11 +387,15 @@ function command() {
   const weights = Object.entries(weightsGiven()).map(([name, value]) => ` --${name} ${value}`).join("");
   const here = `--here ${x.toFixed(3)} ${y.toFixed(3)} ${yaw.toFixed(1)} --torso ${page.torso}${settings}`;
   const name = fileName(".tcs");
+  // The goal that was asked about, or the first one that is not reached.
+  const goal = page.why ?? Math.max(page.outcome.goals.findIndex((one) => !one.reached), 0);
   const scoring = `tcs score ${file().task} --environment ${by("downloadEnvironment").download} --robot ${file().robot} --out ${name}\n`;
-  return `${things.isChanged || editing.at ? scoring : ""}tcs select ${name} ${here}${weights}\ntcs explain ${name} --goal 0 ${here}`;
+  return `${things.isChanged || editing.at ? scoring : ""}tcs select ${name} ${here}${weights}\ntcs explain ${name} --goal ${goal + 1} ${here}`;
 }
 
 function explained(goal) {
+  page.why = goal.goal;
+  showExpert(page.outcome, command());
   const { x, y, yaw } = map.pose;
   return post("explain", { file: view.file, goal: goal.goal, here: [x, y, yaw], torso: page.torso, at: at() });
 }

@@ -13,7 +13,7 @@ export function grouped(marks, apart) {
   return groups.map(({ reached, all }) => ({
     reached,
     at: [0, 1].map((k) => all.reduce((sum, { at }) => sum + at[k], 0) / all.length),
-    text: all.map(({ number }) => number).join(" "),
+    text: all.map(({ number }) => number + 1).join(" "),
     count: all.length,
   }));
 }

@@ -47,7 +47,7 @@ export function modelName(name) {
 // The name of a goal with its number, by which the map and the command line name it.
 export function goalText(goal) {
   const name = goalName(goal);
-  return goal.given_name || goal.body_frame ? `${name} (${goal.goal})` : name;
+  return goal.given_name || goal.body_frame ? `${name} (${goal.goal + 1})` : name;
 }
 
 export function sentence(outcome) {

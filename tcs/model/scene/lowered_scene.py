@@ -88,17 +88,19 @@ def without_bodies(lowered: LoweredScene, names: Collection[str]) -> LoweredScen
 
 def _flat(item: object) -> Iterator[object]:
     """Yield the leaves of nested named tuples, in order."""
+    absent: set[str] = set()
     if isinstance(item, Chain) and not np.any(item.slides):
         # Scenes of revolute joints keep the digests that files were written with.
-        item = item[:-3] if item.joints == 7 else item[:-2]
+        absent = {"slides", "coupled"} | ({"joints"} if item.joints == 7 else set())
     if isinstance(item, SceneArrays):
         # So do scenes without free goals, and without tables of distances.
-        freedom = (item.freedom,) if len(item.freedom) else ()
-        distances = (item.distances,) if len(item.distances.corners) else ()
-        item = (*item[:-2], *freedom, *distances)
+        counts = {"freedom": len(item.freedom), "distances": len(item.distances.corners)}
+        absent = {name for name, count in counts.items() if not count}
     if isinstance(item, tuple):
-        for member in item:
-            yield from _flat(member)
+        names = getattr(item, "_fields", ("",) * len(item))
+        for name, member in zip(names, item, strict=True):
+            if name not in absent:
+                yield from _flat(member)
     else:
         yield item
 

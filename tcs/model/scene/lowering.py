@@ -332,7 +332,7 @@ def _goals_in_frames(scene: Scene, task: Task) -> list[tuple[Frame, RigidTransfo
     found = []
     for i, goal in enumerate(task.goals):
         if goal.body_frame not in frames:
-            where = f"task '{task.name}', goal {i}, environment '{scene.spec.environment.name}'"
+            where = f"task '{task.name}', goal {i + 1}, environment '{scene.spec.environment.name}'"
             raise UnknownNameError("frame", goal.body_frame, frames, where=where)
         X_HG = RigidTransform(Quaternion(goal.quaternion), goal.position)
         found.append((frames[goal.body_frame], X_HG))

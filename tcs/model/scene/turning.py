@@ -73,7 +73,7 @@ def axis_of_turn(task: Task, chain: Chain, robot: str) -> Vector | None:
         free = goal.free
         if free is None or not free.rotates:
             raise TaskError(
-                f"task '{task.name}', goal {i}: the arm of robot '{robot}' has five joints and "
+                f"task '{task.name}', goal {i + 1}: the arm of robot '{robot}' has five joints and "
                 "cannot take every tool pose, so the goal must leave a rotation of the tool free. "
                 "Add 'free: {rotation_about: [x, y, z]}' or 'free: orientation' to the goal."
             )
@@ -83,8 +83,9 @@ def axis_of_turn(task: Task, chain: Chain, robot: str) -> Vector | None:
     for i, axis in named.items():
         if first is not None and np.linalg.norm(np.cross(axis, named[first])) > PARALLEL:
             raise TaskError(
-                f"task '{task.name}': goal {first} leaves the rotation about "
-                f"{axis_name(named[first])} free and goal {i} that about {axis_name(axis)}, but an "
+                f"task '{task.name}': goal {first + 1} leaves the rotation about "
+                f"{axis_name(named[first])} free and goal {i + 1} that about "
+                f"{axis_name(axis)}, but an "
                 f"arm of five joints, as of robot '{robot}', needs the same axis at all goals. "
                 "Score them as two tasks."
             )

@@ -14,7 +14,7 @@ from tcs.output.words.motions import NOT_DONE_TEXTS, not_done_text, place_text
 def report_plan(result: Mapping[str, Any]) -> None:
     """Print the tour of each stop, and why goals are not done."""
     out = results_console()
-    for number, stop in enumerate(result["stops"]):
+    for number, stop in enumerate(result["stops"], start=1):
         out.print(f"stop {number}: {base_pose_text(stop)}, torso {stop['torso']:.2f} m")
         if not stop["segments"]:
             out.print("  no goal can be done from here")
@@ -48,7 +48,7 @@ def report_motions(result: Mapping[str, Any]) -> None:
     for one in result["goals"]:
         reached, done = one["pairs"], one["done"]
         share = f"{1.0 - done / reached:.1%}" if reached else ""
-        table.add_row(str(one["goal"]), f"{reached:,}", f"{done:,}", share)
+        table.add_row(str(one["goal"] + 1), f"{reached:,}", f"{done:,}", share)
     out.print(table)
     for reason, count in result["not_done"].items():
         if count:

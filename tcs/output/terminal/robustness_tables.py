@@ -34,7 +34,7 @@ def report_evaluation(result: Mapping[str, Any]) -> None:
         f"standard deviation {result['std']:.1%}; all goals in {result['complete']:.1%} of "
         f"{result['samples']:,} samples"
     )
-    goals = ", ".join(f"{i}: {part:.1%}" for i, part in enumerate(result["per_goal"]))
+    goals = ", ".join(f"{i}: {part:.1%}" for i, part in enumerate(result["per_goal"], start=1))
     out.print(f"by goal  {goals}")
     widths = ", ".join(f"{joint} {error_width(error)}" for joint, error in result["errors"].items())
     out.print(f"errors  {widths}")

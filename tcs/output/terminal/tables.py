@@ -22,6 +22,7 @@ from tcs.output.words import (
     body_name,
     deviation_text,
     frame_name,
+    goal_list,
     goal_text,
     percentage,
     person_text,
@@ -270,7 +271,7 @@ def report_choice(result: Mapping[str, Any]) -> None:
 
 def _executable_text(found: Mapping[str, Any]) -> str:
     """Return which goals can be done, and what it costs to count those alone."""
-    other, goals = found["by_postures"], ", ".join(map(str, found["goals_done"]))
+    other, goals = found["by_postures"], goal_list(found["goals_done"])
     text = (
         f"goals with motions: {goals}; motions were planned for {found['examined']:,} of "
         f"{found['candidates']:,} configurations\n"

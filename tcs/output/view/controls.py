@@ -84,7 +84,7 @@ class Controls:
         """Every slider with more than one value, in the order in which they are shown."""
         counted = (
             Slider(MEMBER, 1.0, float(len(self._viewed.members)), 1.0),
-            Slider(GOAL, 0.0, float(self._viewed.goals - 1), 1.0),
+            Slider(GOAL, 1.0, float(self._viewed.goals), 1.0),
             Slider(COLOUR, 0.0, float(len(self._colourings) - 1), 1.0),
         )
         moving = (
@@ -102,7 +102,7 @@ class Controls:
         """Return the value of every slider in a state, by name [m or deg]."""
         counted = {
             MEMBER: state.member + 1.0,
-            GOAL: float(state.goal),
+            GOAL: state.goal + 1.0,
             COLOUR: float(self._colourings.index(state.colouring)),
         }
         moving = {

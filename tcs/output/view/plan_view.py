@@ -70,7 +70,7 @@ class PlanView:
     def lines(self) -> list[str]:
         """When each stop is shown and what is done there, and why goals are not done."""
         lines, begin = [], 0.0
-        for number, stop in enumerate(self.plan.stops):
+        for number, stop in enumerate(self.plan.stops, start=1):
             end = begin + stop.duration + _HOLD
             done = f"{goals_text(stop.goals)} done" if stop.goals else "nothing can be done"
             at = base_pose_text(stop.at.to_json())

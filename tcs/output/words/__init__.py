@@ -30,6 +30,8 @@ from tcs.output.words.configurations import (
     settings_text,
 )
 from tcs.output.words.goals import (
+    goal_index,
+    goal_index_of_number,
     goal_list,
     goal_names,
     goal_place,
@@ -82,6 +84,8 @@ __all__ = [
     "frame_name",
     "frames_of_state",
     "gain_text",
+    "goal_index",
+    "goal_index_of_number",
     "goal_list",
     "goal_names",
     "goal_place",

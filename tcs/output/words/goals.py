@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from tcs.errors import SelectionError, UnknownNameError
 from tcs.output.words.bodies import frame_name
 from tcs.placement.tables import Reason
 
 if TYPE_CHECKING:
     from tcs.model.tasks import Goal
+    from tcs.placement.store import ScoreFile
 
 
 def goal_names(task: Mapping[str, Any], goals: int) -> tuple[str, ...]:
@@ -59,12 +61,63 @@ def text_of_goal(task: Mapping[str, Any], goal: int, key: str) -> str | None:
 
 
 def goal_text(goal: int, name: str | None) -> str:
-    """Return the name of a goal, if it has one, and its number, by which options name it.
+    """Return the name of a goal, if it has one, and its number from 1; options take either.
 
     >>> goal_text(2, "left cheek"), goal_text(2, "")
-    ('left cheek (2)', '2')
+    ('left cheek (3)', '3')
     """
-    return f"{name} ({goal})" if name else str(goal)
+    return f"{name} ({goal + 1})" if name else str(goal + 1)
+
+
+def goal_index(file: ScoreFile, given: int | str) -> int:
+    """Return the index of a goal of a score file.
+
+    Args:
+        file: The file.
+        given: The index itself; or the name of the goal, as a task file, `goal_names` or
+            `goal_text` has it.
+
+    Raises:
+        UnknownNameError: If no goal has that name.
+        SelectionError: If several have it.
+    """
+    if not isinstance(given, str):
+        return given
+    goals = file.tables[0].scores.goals
+    shown = goal_names(file.task, goals)
+    plain = [text_of_goal(file.task, goal, "name") for goal in range(goals)]
+    found = [
+        goal
+        for goal in range(goals)
+        if given in (shown[goal], plain[goal], goal_text(goal, shown[goal]))
+    ]
+    if not found:
+        known = [name for name in shown if name]
+        raise UnknownNameError("goal", given, known, where=f"task '{file.metadata['task']}'")
+    if len(found) > 1:
+        raise SelectionError(
+            f"{len(found)} goals of task '{file.metadata['task']}' are called '{given}': "
+            f"{goal_list(found, shown)}. Give the number of one."
+        )
+    return found[0]
+
+
+def goal_index_of_number(file: ScoreFile, given: str) -> int:
+    """Return the index of a goal that is given as people read it: its number from 1, or its name.
+
+    Raises:
+        UnknownNameError: If no goal has that name.
+        SelectionError: If several have it, or there is no such number.
+    """
+    if not given.strip().lstrip("+-").isdecimal():
+        return goal_index(file, given)
+    number, goals = int(given), file.tables[0].scores.goals
+    if not 1 <= number <= goals:
+        raise SelectionError(
+            f"There is no goal {number}: task '{file.metadata['task']}' has {goals}, "
+            f"numbered 1 to {goals}."
+        )
+    return number - 1
 
 
 def goal_list(goals: Iterable[int], names: Sequence[str] = ()) -> str:
@@ -75,7 +128,7 @@ def goal_list(goals: Iterable[int], names: Sequence[str] = ()) -> str:
         names: Names of all goals of the task; "" for a goal without a name. None for numbers alone.
 
     >>> goal_list([0, 3]), goal_list([0, 1], ["chin", ""])
-    ('0, 3', 'chin (0), 1')
+    ('1, 4', 'chin (1), 2')
     """
     return ", ".join(goal_text(goal, names[goal] if names else "") for goal in goals)
 
@@ -88,7 +141,7 @@ def goals_text(goals: Sequence[int], names: Sequence[str] = ()) -> str:
         names: As for `goal_list`.
 
     >>> goals_text([2]), goals_text([0, 3])
-    ('goal 2', 'goals 0, 3')
+    ('goal 3', 'goals 1, 4')
     """
     return f"goal{'' if len(goals) == 1 else 's'} {goal_list(goals, names)}"
 

@@ -21,9 +21,9 @@ def place_text(place: str | int) -> str:
     """Return the begin or end of a segment, as plans have it in JSON.
 
     >>> place_text("rest"), place_text(3)
-    ('rest', 'goal 3')
+    ('rest', 'goal 4')
     """
-    return place if isinstance(place, str) else f"goal {place}"
+    return place if isinstance(place, str) else f"goal {place + 1}"
 
 
 def not_done_text(goal: Mapping[str, Any]) -> str:
@@ -32,7 +32,7 @@ def not_done_text(goal: Mapping[str, Any]) -> str:
     Args:
         goal: The result of a goal that is not done, as plans have it in JSON.
     """
-    text = f"goal {goal['goal']}: {NOT_DONE_TEXTS[goal['reason']]}"
+    text = f"goal {goal['goal'] + 1}: {NOT_DONE_TEXTS[goal['reason']]}"
     if goal["segment"]:
         text += f" ({goal['segment']}, tried for {goal['seconds']:.2f} s)"
     if goal["pair"] is not None:

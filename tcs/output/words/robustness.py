@@ -30,7 +30,7 @@ def mean_and_std(evaluation: Evaluation) -> str:
 def lost_goal(loss: Loss) -> str:
     """Return a sentence that states why a goal is lost."""
     return (
-        f"Goal {loss.goal} ({frame_name(loss.body_frame)}) is reached in "
+        f"Goal {loss.goal + 1} ({frame_name(loss.body_frame)}) is reached in "
         f"{percent(loss.success)} % of the samples; in the others: {stopped_by(loss)}."
     )
 

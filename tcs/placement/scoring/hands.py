@@ -18,7 +18,6 @@ from tcs.model.tasks import Task, partners
 from tcs.placement.scoring.arms import filled, shifted
 from tcs.placement.scoring.job import BARE, Job
 from tcs.placement.scoring.kernel_start import ANALYTIC, NUMERIC
-from tcs.placement.scoring.person import person_entry
 from tcs.placement.scoring.together import Hands, PlacedGoal, together
 from tcs.placement.store import HANDS, OF_ARM, ScoreFile
 from tcs.placement.tables import Reason, ScoreTable
@@ -88,10 +87,7 @@ def score_hands(
     tables = [joined_goals(of_state, numbers, task.weights) for of_state in states]
     spec = SceneSpec(jobs[0].given_robot, jobs[0].spec.environment)
     whole = dataclasses.replace(jobs[0], task=task, spec=spec, hand=BARE, goal_numbers=())
-    entries = {
-        **_entries(jobs, parts),
-        **person_entry(spec.environment, task, tables),
-    }
+    entries = _entries(jobs, parts)
     return dataclasses.replace(setups[0], job=whole).file_of(tables, whole.grid, begun, entries)
 
 

@@ -187,7 +187,6 @@ class ScoringSetup:
             blocks=self.blocks,
             engine=self.engine,
         )
-        person = person_entry(job.spec.environment, job.task, swept.tables)
         contact = prevailing_self_contact(swept.tables, lowered.robot_bodies)
         if contact is not None:
             advice = contact.advice(job.spec.robot)
@@ -196,7 +195,6 @@ class ScoringSetup:
             swept.tables,
             {
                 **constraints_entry(job.constraints, excluded),
-                **person,
                 **({} if shapes is None else {"robot_shapes": shapes.to_dict()}),
                 "scene_digest": lowered.digest(),
                 "ik": swept.ik,
@@ -238,6 +236,8 @@ class ScoringSetup:
                 **self.references,
                 **({"only": list(job.constraints.only)} if job.constraints.only else {}),
                 **entries,
+                # Once for all hands and arms, with the goals as the file numbers them.
+                **person_entry(job.spec.environment, job.task, scores),
                 "measure": self.measure,
                 **self.approach.entry,
                 "timings": {

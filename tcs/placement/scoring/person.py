@@ -42,7 +42,7 @@ def person_entry(
         _log.warning(
             "goal %s is too near to this person: the gripper touches %s in some or all states of "
             "the environment. Goals are moved with the skin, and not changed otherwise.",
-            f"{goal} ({name})" if (name := task.goals[goal].name) else goal,
+            f"{goal + 1} ({name})" if (name := task.goals[goal].name) else goal + 1,
             part,
         )
     goals = [

@@ -241,7 +241,7 @@ def test_an_unknown_body_frame_names_task_goal_and_environment(scene, shaving, f
     goals = list(shaving.goals)
     goals[3] = Goal("haed", goals[3].position, goals[3].quaternion)
     task = dataclasses.replace(shaving, goals=tuple(goals))
-    expected = "task 'shaving', goal 3, environment 'wheelchair': unknown frame 'haed'.*'head'"
+    expected = "task 'shaving', goal 4, environment 'wheelchair': unknown frame 'haed'.*'head'"
     with pytest.raises(UnknownNameError, match=expected):
         lower(scene, task, full_grid)
 

@@ -35,13 +35,13 @@ def test_arms_of_more_joints_need_no_freedom():
     "free", [None, Freedom(tilt=0.3), Freedom(fold=2), Freedom(box=(0.01,) * 3)]
 )
 def test_a_goal_without_a_free_rotation_is_refused(free):
-    with pytest.raises(TaskError, match=r"goal 1: the arm of robot 'arm' has five.*rotation_about"):
+    with pytest.raises(TaskError, match=r"goal 2: the arm of robot 'arm' has five.*rotation_about"):
         freedom_rows(task_with(TURN, free), five_joint_chain(0), "arm")
 
 
 def test_goals_that_free_different_axes_are_refused():
     task = task_with(TURN, Freedom(axis=(0.0, -1.0, 0.0), rotates=True), Freedom(rotates=True))
-    with pytest.raises(TaskError, match=r"goal 0 leaves.*about y free and goal 2 that about x"):
+    with pytest.raises(TaskError, match=r"goal 1 leaves.*about y free and goal 3 that about x"):
         freedom_rows(task, five_joint_chain(0), "arm")
 
 

@@ -133,7 +133,7 @@ def test_goals_that_one_base_pose_misses_have_a_reason_and_a_change(single):
     assert single.unreached
     wording = as_markdown(make_score_page(single, command="c"))
     for goal in single.unreached:
-        named = f"{single.goal_names[goal]} ({goal})"
+        named = f"{single.goal_names[goal]} ({goal + 1})"
         assert f"The cheapest change from stop 1 that reaches goal {named}: " in wording
     assert f"Not reached: {goals_text(single.unreached, single.goal_names)}." in wording
     assert "Nothing was re-checked" in wording

@@ -39,7 +39,7 @@ def moved():
         segment("move", 1, None, AT_GOAL + 0.01, REST, 0.6),
     )
     failed = GoalResult(
-        0, 0, False, "no_path", ("l_forearm_link", "person::head"), "rest to goal 0"
+        0, 0, False, "no_path", ("l_forearm_link", "person::head"), "rest to goal 1"
     )
     return MotionPlan(
         made_from={"task": "shaving", "environment": "wheelchair", "robot": "pr2"},
@@ -74,9 +74,9 @@ def test_the_page_says_what_is_done_when_and_why_not(view, tmp_path):
     text = (tmp_path / "plan.html").read_text()
     assert found["bytes"] == (tmp_path / "plan.html").stat().st_size < 5e6
     assert found["members"] == [HERE.to_json()] * 2
-    assert "0.0 to 3.0 s: stop 0 at x 0.60 m, y -0.90 m, heading 90 deg, goal 1 done" in text
-    assert "3.0 to 4.0 s: stop 1" in text
-    assert "goal 0: no path was found (rest to goal 0" in text
+    assert "0.0 to 3.0 s: stop 1 at x 0.60 m, y -0.90 m, heading 90 deg, goal 2 done" in text
+    assert "3.0 to 4.0 s: stop 2" in text
+    assert "goal 1: no path was found (rest to goal 1" in text
     assert "most often l forearm against head" in text
 
 

@@ -37,10 +37,10 @@ def test_line_states_each_goal_that_is_missed():
     )
     result = ViewedSet(grid, scores, (0,), None).result(0)
     assert result.line(0) == (
-        "goal 0 reached; 1 of 4 goals, P_R 25%, P_M 0.125; too far: 1, 3; arm blocked: 2"
+        "goal 1 reached; 1 of 4 goals, P_R 25%, P_M 0.125; too far: 2, 4; arm blocked: 3"
     )
     assert result.line(2).startswith(
-        "goal 2 not reached: every arm posture would touch something (forearm against head); "
+        "goal 3 not reached: every arm posture would touch something (forearm against head); "
     )
 
 
@@ -53,9 +53,9 @@ def test_line_says_the_place_and_names_the_goals():
         place="On the person's right, facing them.",
     )
     assert result.line(1).startswith(
-        "on the person's right, facing them; goal left cheek (1) not reached: "
+        "on the person's right, facing them; goal left cheek (2) not reached: "
     )
-    assert result.line(0).endswith("too far: left cheek (1)")
+    assert result.line(0).endswith("too far: left cheek (2)")
 
 
 def test_goals_are_assigned_to_members_that_reach_them(bed):

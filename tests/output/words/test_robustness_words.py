@@ -41,7 +41,7 @@ def test_a_pair_is_reported_if_it_collides_in_one_of_five_samples(share, is_stat
 
 def test_a_lost_goal_is_a_sentence():
     assert lost_goal(loss({Reason.TOO_FAR: 1.0})) == (
-        "Goal 3 (forearm left) is reached in 62.5 % of the samples; in the others: too far for the "
+        "Goal 4 (forearm left) is reached in 62.5 % of the samples; in the others: too far for the "
         "arm (100 %)."
     )
 

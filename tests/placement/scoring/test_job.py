@@ -121,7 +121,7 @@ def test_an_unknown_body_frame_names_task_and_goal(tmp_path, small_environment):
         "name: odd\ntitle: odd\nsource: made up\nenvironments: [wheelchair]\ntool: any\ngoals:\n"
         "  - {body_frame: haed, position: [0.2, 0, 0], quaternion_wxyz: [1, 0, 0, 0], weight: 1}\n"
     )
-    with pytest.raises(UnknownNameError, match=r"goal 0.*haed.*Did you mean 'head'"):
+    with pytest.raises(UnknownNameError, match=r"goal 1.*haed.*Did you mean 'head'"):
         score(path, small_environment)
 
 

@@ -9,9 +9,11 @@ import pytest
 import tcs
 from tcs.errors import StoreError
 from tcs.model.people import PAPERS_MAN
+from tcs.placement.scoring import offline
 from tcs.placement.scoring.person import recorded_person
 from tcs.placement.scoring.rebuild import made_from
 from tests.environments import BESIDE, write_environment
+from tests.two_arms import GRID, PAIR, write_pair
 
 SMALL = {"sex": "female", "stature_percentile": 5, "mass_percentile": 5}
 LARGE = {"sex": "male", "stature_percentile": 95, "mass_percentile": 95}
@@ -68,11 +70,46 @@ def test_scores_of_a_person_hold_in_drake(places, caplog, place, task, person, t
     assert entry["given"] == {"model": "person", **person}
     assert {found["goal"]: found["part"] for found in entry["touching_goals"]} == touching
     warnings = [text for text in caplog.messages if "is too near to this person" in text]
-    assert [text.split()[1] for text in warnings] == [str(goal) for goal in touching]
+    assert [text.split()[1] for text in warnings] == [str(goal + 1) for goal in touching]
     assert file.nominal.scores.reached.any()
     # The scene is built again for the person whom the file names.
     found = tcs.verify(file, pairs=40, dense=5)
     assert (found.false_reached, found.missed) == (0, 0)
+
+
+def inside(arm):
+    """Return a goal in the chest, where the gripper touches the person."""
+    return {
+        "name": f"in the chest{arm}",
+        "body_frame": "chest",
+        "position": [0.0, 0.0, 0.0],
+        "quaternion_wxyz": [1.0, 0.0, 0.0, 0.0],
+    }
+
+
+def test_a_goal_of_one_of_several_hands_is_named_once(tmp_path, caplog):
+    place = write_environment(tmp_path, "small", GRID)
+    goals = [PAIR[0] | {"together_with": ""}, inside(" right") | {"arm": "right"}]
+    file = tcs.score(write_pair(tmp_path, goals), place, person=SMALL, approach=False)
+    touching = file.metadata["person"]["touching_goals"]
+    assert [(found["goal"], found["name"]) for found in touching] == [(1, "in the chest right")]
+    warnings = [text for text in caplog.messages if "is too near to this person" in text]
+    assert [text.split(":")[0] for text in warnings] == [
+        "goal 2 (in the chest right) is too near to this person"
+    ]
+
+
+def test_touching_goals_are_those_of_both_arms(tmp_path, monkeypatch):
+    place, rows = write_environment(tmp_path, "small", GRID), []
+
+    def entry(environment, task, tables):
+        rows.extend(table.configurations for table in tables)
+        return {}
+
+    monkeypatch.setattr(offline, "person_entry", entry)
+    task = write_pair(tmp_path, [inside("")])
+    file = tcs.score(task, place, arms="both", person=SMALL, approach=False)
+    assert rows == [file.nominal.scores.configurations]
 
 
 def test_a_record_names_the_person(small_file):

@@ -219,7 +219,9 @@ def _reading(row: RowStudy) -> str:
     lost = sum((1.0 - loss.success) * weights[loss.goal] for loss in row.losses.goals)
     worst = row.losses.goals[0]
     fraction = (1.0 - worst.success) * weights[worst.goal] / lost
-    text = f"{row.name}. Goal {worst.goal} accounts for {percent(fraction, 0)} % of the losses. "
+    text = (
+        f"{row.name}. Goal {worst.goal + 1} accounts for {percent(fraction, 0)} % of the losses. "
+    )
     text += lost_goal(worst)
     if row.gain is not None and row.gain.paired.mean > 0.0:
         robust = row.gain.robust

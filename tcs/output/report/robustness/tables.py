@@ -205,7 +205,7 @@ def losses_table(row: RowStudy) -> Table:
     ]
     body = [
         [
-            str(loss.goal),
+            str(loss.goal + 1),
             loss.body_frame.replace("_", " "),
             percent(loss.success),
             str(loss.member + 1),

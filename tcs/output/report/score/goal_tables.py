@@ -88,7 +88,7 @@ def joints_table(report: ScoreReport) -> Table:
         joints = report.shown.scores.joints_of(report.shown.rows[number], goal)
         if joints is not None:
             angles = (f"{math.degrees(q):.2f}" for q in joints[-len(arm_joints) :].tolist())
-            rows.append([str(goal), str(number + 1), *angles])
+            rows.append([str(goal + 1), str(number + 1), *angles])
     names = (frame_name(name.removesuffix("_joint")) for name in arm_joints)
     return Table(
         "Arm joints [deg] at each goal, rounded from those in the file.",

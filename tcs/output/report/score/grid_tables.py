@@ -22,7 +22,7 @@ def reasons_table(report: ScoreReport) -> Table:
         fractions = [counts.reasons[reason] / counts.configurations for reason in reasons]
         rows.append(
             [
-                str(goal),
+                str(goal + 1),
                 goal_place(report.job.task.goals[goal]),
                 *(percent(fraction, 2) if fraction else "0" for fraction in fractions),
             ]
