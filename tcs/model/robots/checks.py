@@ -161,7 +161,8 @@ def _check_positions(
                 f"{where}: '{name}' is scored (arm or torso), so a posture cannot set it."
             )
         if not joint.is_movable:
-            raise RobotError(f"{where}: '{name}' is fixed and has no position.")
+            limits = "" if joint.locked is None else ": its limits are one value"
+            raise RobotError(f"{where}: '{name}' is fixed{limits}, and has no position. Remove it.")
         _check_within(joint, value, where)
 
 

@@ -19,6 +19,8 @@ FloatArray = NDArray[np.float64]
 AHEAD = 0.7
 """Least cosine between an axis of the tool frame and a direction that it is said to have: 45
 degrees."""
+_APART = 0.02
+"""Distance of a joint from the tool frame that counts as another place [m]."""
 _SHORTEST = 0.005
 """Least distance between the hand and the tool frame that gives a direction [m]."""
 
@@ -77,7 +79,7 @@ def hand_axes(robot: RobotFile) -> HandAxes | None:
     Fingers are what joints beyond the arm move. Their direction is that of the centre of their
     primitives, seen from the last joint of the arm. Without fingers it is that from the centre of
     the last link's primitives to the tool frame, or, where the tool frame lies behind them, that of
-    the centre, seen from the last joint.
+    the centre, seen from the last joint that is not at the tool frame itself.
 
     Args:
         robot: The robot, at rest.
@@ -92,14 +94,15 @@ def hand_axes(robot: RobotFile) -> HandAxes | None:
     fingers = _fingers(model, robot.arm_joints[-1])
     centres = [_centre(robot, model, finger, positions) for finger in fingers]
     found = [centre for centre in centres if centre is not None]
-    _, start = pose_in_root(model, last, positions)
     if found:
+        _, start = pose_in_root(model, last, positions)
         ahead = np.mean(found, axis=0) - start
         opening = _widest(np.array(found), ahead)
     else:
         hand = _centre(robot, model, model.links_moved_by(robot.arm_joints[-1]), positions)
         if hand is None:
             return None
+        start = _joint_before(robot, model, positions, p_T)
         is_behind = np.linalg.norm(p_T - start) < np.linalg.norm(hand - start)
         ahead, opening = hand - start if is_behind else p_T - hand, None
     length = float(np.linalg.norm(ahead))
@@ -110,6 +113,18 @@ def hand_axes(robot: RobotFile) -> HandAxes | None:
         opening=None if opening is None else R_T.T @ opening,
         fingers=bool(found),
     )
+
+
+def _joint_before(
+    robot: RobotFile, model: Urdf, positions: Mapping[str, float], p_T: FloatArray
+) -> FloatArray:
+    """Return the last joint of the arm that is not where the tool frame is, in the root [m]."""
+    start = p_T
+    for name in reversed(robot.arm_joints):
+        _, start = pose_in_root(model, model.joints[name].child, positions)
+        if np.linalg.norm(p_T - start) > _APART:
+            break
+    return start
 
 
 def _fingers(model: Urdf, last: str) -> list[frozenset[str]]:

@@ -137,6 +137,19 @@ def test_a_frame_behind_a_fixed_gripper_points_out_of_it(tmp_path):
     assert any(r.startswith("doubtful: the hand") for r in draft.remarks)
 
 
+def test_a_flange_at_the_last_joint_points_away_from_its_link(tmp_path):
+    """As tool0 of Universal Robots: link and joint before it lie behind the frame."""
+    text = urdf().replace('name="grip" type="prismatic"', 'name="grip" type="fixed"')
+    text = text.replace("0 0 0.12", "0 0 -0.03").replace("0 0.02 0.145", "0 0 -0.05")
+    # The wrist's last axis is 0.1 m ahead of the two before.
+    text = text.replace('<origin xyz="0.0 0.0 0.0"/><parent link="arm6"/>',
+                        '<origin xyz="0.0 0.0 0.1"/><parent link="arm6"/>')  # fmt: skip
+    file = tmp_path / "flange.urdf"
+    file.write_text(text.replace('"0 0 0.2"', '"0 0 0"'))
+    draft = draft_robot(file, "tool", DraftOptions(coarse=True))
+    assert any("the last link points along +x of 'tool'" in r for r in draft.remarks)
+
+
 def test_segments_of_a_telescope_that_are_not_coupled_are_refused(tmp_path):
     """Before, slides along one direction counted as a freedom each."""
     file = tmp_path / "telescope.urdf"
