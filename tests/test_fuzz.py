@@ -74,7 +74,7 @@ def small_plan():
     times = np.linspace(0.0, 1.0, 4)
     positions = np.linspace(0.0, 0.3, 4)[:, None] * np.ones(7)
     timing = Timed(times=times, positions=positions, velocities=np.full((4, 7), 0.3))
-    segment = Segment("move", None, 0, (), timing)
+    segment = Segment("move", None, 0, timing)
     at = InitialConfiguration(base_x=0.0, base_y=0.0, base_yaw=0.0, torso=0.0)
     return MotionPlan(
         made_from={"task": "fetch"},

@@ -8,12 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.kinematics import tool_pose
 from tcs.kernel.motion.postures import postures_at
 from tcs.kernel.motion.straight import (
     BLOCKED,
     LIMITS,
-    OFF_LINE,
     StraightSearch,
     new_straight_workspace,
     next_straight,
@@ -168,28 +166,6 @@ def _spread(stop: Stop, found: list[Access]) -> tuple[Access, ...]:
         away = np.min([joint_time(stop, begins[i], begins) for i in chosen], axis=0)
         chosen.append(int(np.argmax(away)))
     return tuple(found[i] for i in chosen)
-
-
-def is_straight(stop: Stop, curve: Curve) -> bool:
-    """Return whether the tool moves along a line at constant orientation, within OFF_LINE.
-
-    Args:
-        stop: The initial configuration.
-        curve: A motion whose ends are on the line.
-    """
-    scene = stop.motion
-    link_R, link_p = np.empty((8, 3, 3)), np.empty((8, 3))
-    fractions = np.array([0.0, 0.5])
-    q = np.concatenate([curve.points(piece, fractions) for piece in range(curve.pieces)])
-    q = np.concatenate([q, curve.q[-1:]])
-    R, p = np.empty((len(q), 3, 3)), np.empty((len(q), 3))
-    for n, posture in enumerate(q):
-        tool_pose(scene.chain_R, scene.chain_p, posture, link_R, link_p, R[n], p[n])
-    line = (p[-1] - p[0]) / np.linalg.norm(p[-1] - p[0])
-    from_begin = p - p[0]
-    off = np.linalg.norm(from_begin - np.outer(from_begin @ line, line), axis=1)
-    turned = np.linalg.norm(R - R[0], axis=(1, 2)) / np.sqrt(2.0)
-    return bool(max(np.max(off), np.max(turned)) <= OFF_LINE)
 
 
 def joint_time(stop: Stop, start: FloatArray, ends: FloatArray) -> FloatArray:

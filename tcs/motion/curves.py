@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tcs.kernel.arrays import FloatArray
+from tcs.kernel.arrays import FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +41,25 @@ class Curve:
         a, b, c, d = self.control_points(piece)
         u = 1.0 - t
         return np.asarray(u**3 * a + 3 * u**2 * t * b + 3 * u * t**2 * c + t**3 * d)
+
+    def derivatives(
+        self, piece: IntArray, fraction: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return joint angles and their first two derivatives by the parameter, shapes (n, 7).
+
+        Args:
+            piece: Number of the piece at each point, shape (n,).
+            fraction: Fraction of the piece, shape (n,).
+        """
+        length = np.diff(self.knots)[piece][:, None]
+        t = np.asarray(fraction)[:, None]
+        u = 1.0 - t
+        a, d = self.q[piece], self.q[piece + 1]
+        b, c = a + length * self.dq[piece] / 3.0, d - length * self.dq[piece + 1] / 3.0
+        position = u**3 * a + 3 * u**2 * t * b + 3 * u * t**2 * c + t**3 * d
+        first = 3.0 * (u**2 * (b - a) + 2 * u * t * (c - b) + t**2 * (d - c)) / length
+        second = 6.0 * (u * (c - 2 * b + a) + t * (d - 2 * c + b)) / length**2
+        return position, first, second
 
     def reverse(self) -> Curve:
         """Return the same curve from its end to its begin."""

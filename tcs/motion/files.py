@@ -77,8 +77,7 @@ def plan_csv(plan: MotionPlan) -> str:
             timing = segment.timing
             samples = zip(timing.times, timing.positions, timing.velocities, strict=True)
             for at, q, v in samples:
-                numbers = [f"{x + 0.0:.9g}" for x in (*q, *v)]
-                rows.writerow([*head, f"{begin + at:.6f}", *numbers])
+                rows.writerow([*head, f"{begin + at:.9f}", *q.tolist(), *v.tolist()])
             begin += timing.duration
     return out.getvalue()
 
@@ -86,8 +85,9 @@ def plan_csv(plan: MotionPlan) -> str:
 def plan_messages(plan: MotionPlan, *, ros: int = 2) -> str:
     """Return the trajectory of each stop in the layout of ROS `trajectory_msgs/JointTrajectory`.
 
-    One YAML document for each stop with motions. Accelerations [rad/s^2] are the derivatives of the
-    sampled velocities.
+    One YAML document for each stop with motions. Points have no accelerations: controllers follow
+    cubics, the plan's curve, through positions and velocities, but quintics where accelerations are
+    given too, and those of a plan jump.
 
     Args:
         plan: The plan.
@@ -99,25 +99,22 @@ def plan_messages(plan: MotionPlan, *, ros: int = 2) -> str:
         if not stop.segments:
             continue
         found = stop.samples()
-        accelerations = np.gradient(found.velocities, found.times, axis=0)
-        rows = zip(found.times, found.positions, found.velocities, accelerations, strict=True)
+        rows = zip(found.times, found.positions, found.velocities, strict=True)
         message = {
             "header": {"seq": 0, **begin} if ros == 1 else begin,
             "joint_names": list(plan.joints),
-            "points": [
-                {**_point(q, v, a), "time_from_start": _time(t, ros)} for t, q, v, a in rows
-            ],
+            "points": [{**_point(q, v), "time_from_start": _time(t, ros)} for t, q, v in rows],
         }
         # JSON is YAML, and much faster to write.
         documents.append(json.dumps(message))
     return "".join(f"---\n{document}\n" for document in documents)
 
 
-def _point(q: FloatArray, v: FloatArray, a: FloatArray) -> dict[str, Any]:
+def _point(q: FloatArray, v: FloatArray) -> dict[str, Any]:
     return {
-        "positions": (q.round(9) + 0.0).tolist(),
-        "velocities": (v.round(9) + 0.0).tolist(),
-        "accelerations": (a.round(9) + 0.0).tolist(),
+        "positions": q.tolist(),
+        "velocities": v.tolist(),
+        "accelerations": [],
         "effort": [],
     }
 

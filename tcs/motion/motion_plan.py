@@ -13,7 +13,10 @@ from tcs.errors import TcsError
 from tcs.model.grid import InitialConfiguration
 from tcs.motion.curves import Curve
 from tcs.motion.stops import BodyPair
-from tcs.motion.timing import Timed
+from tcs.motion.timing import DECIMALS, Timed
+
+INTERPOLATION = "cubic Hermite"
+"""What a motion is between its samples: the cubics through their positions and velocities."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,14 +29,17 @@ class Segment:
     """Goal near which it begins; None for rest. A straight motion begins and ends near one goal."""
     end: int | None
     """Goal near which it ends; None for rest."""
-    curves: tuple[Curve, ...]
-    """The path; the arm stops between curves."""
     timing: Timed
 
     @property
+    def curve(self) -> Curve:
+        """The motion as a curve: joint angles by the time [s]."""
+        return Curve(self.timing.times, self.timing.positions, self.timing.velocities)
+
+    @property
     def edges(self) -> int:
-        """Number of pieces of its curves."""
-        return sum(curve.pieces for curve in self.curves)
+        """Number of pieces between samples."""
+        return self.curve.pieces
 
     def to_json(self) -> dict[str, Any]:
         """Return the segment as plain containers, angles in radians."""
@@ -43,10 +49,10 @@ class Segment:
             "to": "rest" if self.end is None else self.end,
             "duration": self.timing.duration,
             "edges": self.edges,
-            "times": self.timing.times.round(6).tolist(),
-            # Adding 0.0 turns -0.0 into 0.0.
-            "positions": (self.timing.positions.round(9) + 0.0).tolist(),
-            "velocities": (self.timing.velocities.round(9) + 0.0).tolist(),
+            "times": self.timing.times.tolist(),
+            # Not rounded: limits are kept by the curve through these very numbers.
+            "positions": self.timing.positions.tolist(),
+            "velocities": self.timing.velocities.tolist(),
         }
 
 
@@ -157,6 +163,7 @@ class MotionPlan:
         return {
             "made_from": dict(self.made_from),
             "joints": list(self.joints),
+            "interpolation": INTERPOLATION,
             "stops": [stop.to_json() for stop in self.stops],
             "goals": len(self.results),
             "goals_reached": sum(result.stop is not None for result in self.results),
@@ -179,7 +186,7 @@ def joined(parts: Sequence[Timed]) -> Timed:
     """Return timed curves one after the other; a sample where two meet is there once."""
     times, positions, velocities = [parts[0].times], [parts[0].positions], [parts[0].velocities]
     for part in parts[1:]:
-        times.append(times[-1][-1] + part.times[1:])
+        times.append((times[-1][-1] + part.times[1:]).round(DECIMALS))
         positions.append(part.positions[1:])
         velocities.append(part.velocities[1:])
     return Timed(np.concatenate(times), np.concatenate(positions), np.concatenate(velocities))

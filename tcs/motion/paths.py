@@ -26,7 +26,12 @@ NARROWEST_CORNER = 0.005
 
 
 def find_path(
-    stop: Stop, starts: FloatArray, goals: FloatArray, *, iterations: int = ITERATIONS
+    stop: Stop,
+    starts: FloatArray,
+    goals: FloatArray,
+    *,
+    iterations: int = ITERATIONS,
+    turns: bool = True,
 ) -> tuple[FloatArray, int] | None:
     """Return a path from one of several postures to one of several others, None if none is found.
 
@@ -35,12 +40,20 @@ def find_path(
         starts: Joint angles at which nothing touches [rad], shape (n, 7).
         goals: Joint angles at which nothing touches [rad], shape (m, 7).
         iterations: Greatest number of random postures to grow towards.
+        turns: Whether joints without limits may end full turns away from the goal.
 
     Returns:
         Postures of the path [rad], shape (k, 7), with certified straight edges, and the number of
-        the goal. Joints without limits may end full turns away from it.
+        the goal.
     """
-    count = connect(stop.motion, stop.work, stop.trees, starts, goals, iterations, SHORTCUTS)
+    motion = stop.motion
+    if not turns:
+        # As joints with limits that are half a turn beyond the postures.
+        ends, turning = np.concatenate([starts, goals]), motion.period > 0.0
+        lower = np.where(turning, ends.min(axis=0) - np.pi, motion.lower)
+        upper = np.where(turning, ends.max(axis=0) + np.pi, motion.upper)
+        motion = motion._replace(lower=lower, upper=upper, period=np.zeros(7))
+    count = connect(motion, stop.work, stop.trees, starts, goals, iterations, SHORTCUTS)
     return (stop.trees.path[:count].copy(), int(stop.trees.ends[1])) if count else None
 
 

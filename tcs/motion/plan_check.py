@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -11,7 +10,10 @@ import numpy as np
 
 from tcs.errors import StoreFormatError
 from tcs.kernel.arrays import FloatArray
+from tcs.kernel.motion.straight import OFF_LINE
 from tcs.model.scene import goal_poses
+from tcs.model.tasks import TOOL_SPEED
+from tcs.motion.cubics import at_times, extremes
 from tcs.motion.motion_plan import MotionPlan, Segment, StopPlan
 from tcs.motion.plans import value_of
 from tcs.motion.recheck import StopCheck
@@ -20,12 +22,17 @@ from tcs.motion.timing import Timed
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.rebuild import rebuild_made_from
 
-SAME_POSTURE = 1e-6
-"""Greatest difference of the posture between two segments [rad]: files hold nine decimals."""
+ROUNDING = 1e-9
+"""Greatest difference of the posture between two segments [rad], and greatest velocity at their
+ends [rad/s]."""
 POSITION_BAR = 1e-6
 """Greatest distance of the tool from its goal at the end of an approach [m]."""
-LIMIT_BAR = 1.001
-"""Greatest fraction of a velocity or acceleration limit: times in files hold six decimals."""
+LIMIT_BAR = 1.0 + 1e-6
+"""Greatest fraction of a limit: sums of the cubics' coefficients round."""
+TOOL_SECONDS = 0.004
+"""Time between two postures at which the tool is measured on a straight motion [s]; it is measured
+anew, TOOL_FINER as close, where it is fastest."""
+TOOL_FINER = 20
 
 
 @dataclass(frozen=True)
@@ -38,18 +45,24 @@ class PlanCheck:
     false: int
     """Number of these that Drake finds in contact or beyond joint limits."""
     jumps: int
-    """Number of segments that do not begin where the one before ended; the first begins at rest."""
+    """Number of segments that do not begin where the one before ended, or not at rest: the first of
+    a stop begins in the rest posture, and the last ends there if the arm returns."""
     goals: int
     """Number of approaches."""
     max_position_error: float
     """Greatest distance of the tool from its goal at the end of an approach [m]."""
     velocity: float
-    """Greatest velocity at a sample, as a fraction of its limit."""
+    """Greatest velocity on the cubics, as a fraction of its limit."""
     acceleration: float
-    """Greatest mean acceleration between two samples, as a fraction of its limit."""
+    """Greatest acceleration on the cubics, as a fraction of its limit."""
     jerk: float | None
-    """Greatest mean jerk from one pair of samples to the next, rest before and after the motions of
-    a stop included, as a fraction of its limit; None if the plan has no jerk limits."""
+    """Greatest jerk on the cubics, rest before and after each segment included, as a fraction of
+    its limit; None if the plan has no jerk limits."""
+    tool_speed: float
+    """Greatest speed of the tool on straight segments [m/s]."""
+    max_line_error: float
+    """Greatest distance of the tool from the line, and angle from its orientation there, on
+    straight segments [m and rad]."""
 
     @property
     def is_sound(self) -> bool:
@@ -59,6 +72,8 @@ class PlanCheck:
             and self.jumps == 0
             and self.max_position_error <= POSITION_BAR
             and max(self.velocity, self.acceleration, self.jerk or 0.0) <= LIMIT_BAR
+            and self.tool_speed <= LIMIT_BAR * TOOL_SPEED
+            and self.max_line_error <= LIMIT_BAR * OFF_LINE
         )
 
     def to_json(self) -> dict[str, Any]:
@@ -85,7 +100,7 @@ def check_plan(
     total, done = sum(len(stop.segments) for stop in plan.stops), 0
     check = None
     edges = false = jumps = goals = 0
-    error = velocity = acceleration = jerk = 0.0
+    error = velocity = acceleration = jerk = speed = off_line = 0.0
     for planned in plan.stops:
         stop = stop_of(plan, planned, job, scene)
         check = StopCheck(stop, check)
@@ -96,17 +111,21 @@ def check_plan(
             if segment.type == "approach":
                 goals += 1
                 error = max(error, _position_error(segment, stop))
-            timing = segment.timing
-            rates = np.diff(timing.velocities, axis=0) / np.diff(timing.times)[:, None]
-            velocity = max(velocity, float(np.max(np.abs(timing.velocities) / stop.velocity)))
-            acceleration = max(acceleration, float(np.max(np.abs(rates) / stop.acceleration)))
+            if segment.type != "move":
+                measured = _tool(segment.timing, stop)
+                speed, off_line = max(speed, measured[0]), max(off_line, measured[1])
+            found = extremes(segment.timing)
+            velocity = max(velocity, float(np.max(found.velocity / stop.velocity)))
+            acceleration = max(acceleration, float(np.max(found.acceleration / stop.acceleration)))
             if plan.jerk_limits is not None:
-                jerk = max(jerk, float(np.max(_greatest_jerk(timing) / plan.jerk_limits)))
+                jerk = max(jerk, float(np.max(found.jerk / plan.jerk_limits)))
             done += 1
             if on_progress is not None:
                 on_progress(done, total)
     of_limits = None if plan.jerk_limits is None else jerk
-    return PlanCheck(edges, false, jumps, goals, error, velocity, acceleration, of_limits)
+    return PlanCheck(
+        edges, false, jumps, goals, error, velocity, acceleration, of_limits, speed, off_line
+    )
 
 
 def stop_of(plan: MotionPlan, planned: StopPlan, job: Job, scene: Any) -> Stop:
@@ -145,30 +164,53 @@ def check_names(plan: MotionPlan, job: Job) -> None:
 
 
 def _jumps(planned: StopPlan, stop: Stop) -> int:
-    """Return how many segments do not begin where the one before ended."""
-    if not planned.segments:
-        return 0
-    begins = [segment.timing.positions[0] for segment in planned.segments]
-    ends = [segment.timing.positions[-1] for segment in planned.segments]
-    jumps = int(np.any(np.abs(begins[0] - stop.rest) > SAME_POSTURE))
-    for end, (_, begin) in zip(ends[:-1], itertools.pairwise(begins), strict=True):
-        jumps += int(np.any(np.abs(begin - end) > SAME_POSTURE))
+    """Return how many segments do not begin where the one before ended, or not at rest."""
+    where = stop.rest
+    jumps = 0
+    for segment in planned.segments:
+        timing = segment.timing
+        moved = np.abs([timing.positions[0] - where, *timing.velocities[[0, -1]]])
+        jumps += int(np.any(moved > ROUNDING))
+        where = timing.positions[-1]
+    if planned.segments and planned.returns:
+        jumps += int(np.any(np.abs(where - stop.rest) > ROUNDING))
     return jumps
 
 
-def _greatest_jerk(timing: Timed) -> FloatArray:
-    """Return the greatest mean jerk of each joint from one pair of samples to the next [rad/s^3].
+def _tool(timing: Timed, stop: Stop) -> tuple[float, float]:
+    """Return the tool's greatest speed [m/s], and how far it is off the line [m and rad].
 
     Args:
-        timing: Samples of a motion; before and after it the joints rest.
+        timing: A straight motion.
+        stop: Its stop.
     """
-    steps = np.diff(timing.times)
-    rates = np.diff(timing.velocities, axis=0) / steps[:, None]
-    at_rest = np.zeros((1, 7))
-    steps, rates = np.concatenate([[0.0], steps, [0.0]]), np.concatenate([at_rest, rates, at_rest])
-    apart = 0.5 * (steps[1:] + steps[:-1])
-    greatest: FloatArray = np.max(np.abs(np.diff(rates, axis=0)) / apart[:, None], axis=0)
-    return greatest
+    scene = stop.scene
+    scene.set_arm(timing.positions[-1])
+    end = scene.tool_pose()
+    scene.set_arm(timing.positions[0])
+    begin = scene.tool_pose()
+    line = end.translation() - begin.translation()
+    line = line / max(float(np.linalg.norm(line)), POSITION_BAR)
+
+    def speeds(times: FloatArray) -> list[float]:
+        found = []
+        for q, v in zip(*at_times(timing, times), strict=True):
+            scene.set_arm(q)
+            found.append(float(np.linalg.norm(scene.tool_jacobian()[3:] @ v)))
+            pose = scene.tool_pose()
+            away = pose.translation() - begin.translation()
+            turned = begin.rotation().inverse().multiply(pose.rotation()).ToAngleAxis().angle()
+            off.extend([float(np.linalg.norm(away - (away @ line) * line)), float(turned)])
+        return found
+
+    off: list[float] = []
+    count = max(int(np.ceil(timing.duration / TOOL_SECONDS)), 2)
+    times = np.union1d(np.linspace(0.0, timing.duration, count + 1), timing.times)
+    coarse = speeds(times)
+    fastest = int(np.argmax(coarse))
+    near = times[max(fastest - 1, 0)], times[min(fastest + 1, len(times) - 1)]
+    fine = speeds(np.linspace(*near, 2 * TOOL_FINER + 1))
+    return max(*coarse, *fine), max(off)
 
 
 def _position_error(segment: Segment, stop: Stop) -> float:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import TcsError
+from tcs.kernel.arrays import FloatArray
 from tcs.kernel.motion.edges import certified
 from tcs.kernel.motion.trees import new_trees
 from tcs.model.scene import LoweredScene, Scene, lower
@@ -21,8 +23,9 @@ from tcs.motion.motion_plan import MotionPlan, Segment, StopPlan
 from tcs.motion.plan_check import check_names
 from tcs.motion.plans import value_of
 from tcs.motion.stop_tour import plan_stop
-from tcs.motion.stops import Stop, StopGrid, single_grid
+from tcs.motion.stops import BodyPair, Stop, StopGrid, single_grid
 from tcs.placement.robustness import ErrorModel, Mean, mean_of
+from tcs.placement.robustness.body_collisions import base_bodies
 from tcs.placement.robustness.displacements import displaced
 from tcs.placement.robustness.trials import Errors, Progress
 from tcs.placement.scoring.job import Job
@@ -39,7 +42,8 @@ class PlanSuccess:
     blind: NDArray[np.bool_]
     """Whether the motions of each stop touch nothing as planned, shape (samples, stops)."""
     replanned: NDArray[np.bool_] | None
-    """Whether motions to all goals that the stop does were found anew, shape (samples, stops)."""
+    """Whether motions to all goals that the stop does were found anew, from there or, where that
+    fails, from another stop of the plan, shape (samples, stops)."""
     clipped: int
     """Number of samples in which an error is limited at a joint limit."""
     errors: ErrorModel
@@ -89,7 +93,8 @@ def evaluate_plan(
     In each sample the joints of the error model are displaced by random errors, as `evaluate` does.
     The motions are played as planned, without knowledge of the errors, and must keep the distances
     that scoring requires; and motions to the same goals, which move with the person, are planned
-    anew with knowledge of them. The base stands where planned.
+    anew with knowledge of them: a goal that is lost at its stop is tried from the other stops too.
+    The base stands where planned; its contacts with the furniture do not count, as in `evaluate`.
 
     Args:
         plan: The plan, e.g. from `load_plan`.
@@ -112,19 +117,26 @@ def evaluate_plan(
         raise TcsError("The plan has no motions, so there is nothing to evaluate.")
     model = ErrorModel.of(scene, errors)
     offsets = model.draw(samples, seed, stream=_STREAM)
+    # Those with motions first; the others are tried for goals that are lost there.
+    stops += [planned for planned in plan.stops if not planned.segments]
     places = [_Place.of(planned, job, scene) for planned in stops]
     displacements = [displaced(job, scene, place.nominal, offsets) for place in places]
     jerk = None if plan.jerk_limits is None else np.array(plan.jerk_limits)
-    blind = np.zeros((samples, len(places)), dtype=np.bool_)
+    doing = sum(bool(planned.segments) for planned in stops)
+    blind = np.zeros((samples, doing), dtype=np.bool_)
     again = np.zeros_like(blind)
     for i in range(samples):
-        for number, (place, (positions, _)) in enumerate(zip(places, displacements, strict=True)):
-            state = {name: float(values[i]) for name, values in positions.items()}
-            stop = place.displaced(state, seed)
+        for number, place in enumerate(places[:doing]):
+            stop = place.displaced(_sample(displacements[number], i), seed)
             blind[i, number] = _is_free(stop, place.planned)
-            if replan:
-                found, _ = plan_stop(stop, None, number, place.planned.goals, jerk=jerk)
-                again[i, number] = set(found.goals) == set(place.planned.goals)
+            if not replan:
+                continue
+            lost = set(place.planned.goals) - _done(stop, place.planned.goals, jerk)
+            for other, elsewhere in enumerate(places):
+                if lost and other != number:
+                    stop = elsewhere.displaced(_sample(displacements[other], i), seed)
+                    lost -= _done(stop, sorted(lost), jerk)
+            again[i, number] = not lost
         if on_progress is not None:
             on_progress(i + 1, samples)
     limited = np.any([clipped for _, clipped in displacements], axis=0)
@@ -149,6 +161,8 @@ class _Place:
     stops: StopGrid
     values: Mapping[str, float]
     """Value of each axis [m or rad]."""
+    ignored: frozenset[BodyPair]
+    """The base and the furniture, which may touch."""
 
     @classmethod
     def of(cls, planned: StopPlan, job: Job, scene: Scene) -> _Place:
@@ -157,7 +171,13 @@ class _Place:
         values = {axis.name: value_of(planned.at, axis.name) for axis in axes}
         grid = single_grid(axes, list(values.values()))
         lowered = lower(scene, job.task, grid)
-        return cls(planned, job, scene, lowered, StopGrid.of(job, scene, grid, lowered), values)
+        is_person = scene.spec.environment.is_person
+        furniture = [
+            body for body in lowered.environment_bodies if not is_person(body.split("::")[0])
+        ]
+        ignored = frozenset(itertools.product(base_bodies(scene), furniture))
+        stops = StopGrid.of(job, scene, grid, lowered)
+        return cls(planned, job, scene, lowered, stops, values, ignored)
 
     @property
     def nominal(self) -> dict[str, float]:
@@ -171,23 +191,34 @@ class _Place:
         arrays = environment_at(self.lowered, self.scene, self.job.task, [state])
         lowered = dataclasses.replace(self.lowered, arrays=arrays)
         stop = self.stops.with_environment(lowered).stop(0, new_trees(seed))
+        stop = dataclasses.replace(stop, ignored=self.ignored)
         stop.place({**self.values, **state})
         for name, value in state.items():
             self.scene.set_joint(name, value)
         return stop
 
 
+def _sample(displacements: tuple[Mapping[str, FloatArray], Any], i: int) -> dict[str, float]:
+    """Return the positions of the environment's joints in a sample [m or rad]."""
+    return {name: float(values[i]) for name, values in displacements[0].items()}
+
+
+def _done(stop: Stop, goals: Sequence[int], jerk: FloatArray | None) -> set[int]:
+    """Return the goals to which motions are found."""
+    return set(plan_stop(stop, None, 0, goals, jerk=jerk)[0].goals)
+
+
 def _is_free(stop: Stop, planned: StopPlan) -> bool:
     """Return whether the motions of a stop touch nothing; virtual walls do not count."""
-    return not stop.scene.violations() and all(
+    return not stop.resting_contacts() and all(
         _segment_is_free(stop, segment) for segment in planned.segments
     )
 
 
 def _segment_is_free(stop: Stop, segment: Segment) -> bool:
+    curve = segment.curve
     return all(
         certified(stop.lines, stop.line_work, curve.control_points(piece)) == 1.0
-        for curve in segment.curves
         for piece in range(curve.pieces)
     )
 

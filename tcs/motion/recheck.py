@@ -8,17 +8,21 @@ import numpy as np
 
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.motion.scene import MotionScene
-from tcs.model.scene import NeighbourList
+from tcs.model.scene import NeighbourList, Scene
+from tcs.motion.cubics import extremes
 from tcs.motion.curves import Curve
 from tcs.motion.keep_out import scene_with_keep_out, spec_with_keep_out
 from tcs.motion.motion_plan import Segment
 from tcs.motion.stops import Stop
+from tcs.motion.timing import Timed
 
 LARGEST_STEP = 0.001
 """Greatest motion of any point of the arm between two checked postures [m]."""
 CLEARANCE_ROUNDING = 2e-6
 """Tolerance of a clearance measured by Drake [m]: its distance between boxes is accurate to
 1e-6 m."""
+LIMIT_ROUNDING = 1e-9
+"""How far beyond a joint limit sums of a cubic's coefficients may round [rad]."""
 COARSE = 24
 """Parts of a piece of which the motion of the arm is measured."""
 
@@ -42,7 +46,7 @@ class StopCheck:
     def false_pieces(self, segment: Segment) -> int:
         """Return how many pieces of a segment Drake refutes."""
         neighbours = self._paths if segment.type == "move" else self._lines
-        return sum(false_pieces(neighbours, self.stop.motion, curve) for curve in segment.curves)
+        return false_pieces(neighbours, self.stop.motion, segment.curve)
 
 
 def _with_walls(stop: Stop, known: NeighbourList | None) -> NeighbourList:
@@ -63,18 +67,27 @@ def false_pieces(neighbours: NeighbourList, motion: MotionScene, curve: Curve) -
         curve: A curve of the scored arm.
     """
     return sum(
-        not _is_true(neighbours, curve.points(piece, dense_fractions(motion, curve, piece)))
+        not (
+            _is_within_limits(neighbours.scene, curve, piece)
+            and _is_free(neighbours, curve.points(piece, dense_fractions(motion, curve, piece)))
+        )
         for piece in range(curve.pieces)
     )
 
 
-def _is_true(neighbours: NeighbourList, postures: FloatArray) -> bool:
-    scene = neighbours.scene
+def _is_within_limits(scene: Scene, curve: Curve, piece: int) -> bool:
+    both = slice(piece, piece + 2)
+    found = extremes(Timed(curve.knots[both], curve.q[both], curve.dq[both]))
     lower, upper = scene.arm_limits
+    return bool(
+        np.all(found.least >= lower - LIMIT_ROUNDING)
+        and np.all(found.greatest <= upper + LIMIT_ROUNDING)
+    )
+
+
+def _is_free(neighbours: NeighbourList, postures: FloatArray) -> bool:
+    scene = neighbours.scene
     for q in postures:
-        # Control points are within the limits; sums of them round.
-        if np.any(q < lower - 1e-9) or np.any(q > upper + 1e-9):
-            return False
         scene.set_arm(q)
         for first, second, distance in neighbours.violations():
             if distance < scene.required_clearance(first, second) - CLEARANCE_ROUNDING:

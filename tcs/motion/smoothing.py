@@ -12,45 +12,27 @@ time with continuous acceleration, so that its jerk is constant between two knot
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from tcs.kernel.arrays import FloatArray
 from tcs.motion.curves import Curve
-from tcs.motion.timing import SAMPLE_SECONDS, Timed, timed
+from tcs.motion.limits import MotionLimits
+from tcs.motion.timing import DECIMALS, SAMPLE_SECONDS, Timed, timed
 
 SLOWER = (1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
 """Factors of the time by which a curve is slowed down, in the order of the attempts. The way that
 the average cuts off falls with the sixth power of the factor."""
 FINE = 0.002
 """Time between two samples of what is averaged [s]."""
-RESOLUTION = 1e-6
-"""Times of knots are multiples of this [s], which files hold exactly."""
 KNOTS_IN_WINDOW = 8
 """Least number of knots of the spline in a window: its jerk is some ten per cent above that of the
 average, which costs three per cent of the time."""
 
 
-@dataclass(frozen=True, eq=False)
-class RateLimits:
-    """Limits of the joints' rates, each of shape (7,)."""
-
-    velocity: FloatArray
-    """Velocity limits [rad/s]."""
-    acceleration: FloatArray
-    """Acceleration limits [rad/s^2]."""
-    jerk: FloatArray
-    """Jerk limits [rad/s^3]; inf for joints without one."""
-
-    @property
-    def bound_jerk(self) -> bool:
-        """Whether the jerk of a joint is limited."""
-        return bool(np.any(np.isfinite(self.jerk)))
-
-
-def smoothed(curve: Curve, limits: RateLimits, accepted: Callable[[Curve], bool]) -> Curve | None:
+def smoothed(curve: Curve, limits: MotionLimits, accepted: Callable[[Curve], bool]) -> Curve | None:
     """Return a motion along a curve within limits of velocity, acceleration and jerk.
 
     Args:
@@ -70,37 +52,6 @@ def smoothed(curve: Curve, limits: RateLimits, accepted: Callable[[Curve], bool]
         if accepted(motion):
             return motion
     return None
-
-
-def sampled(motion: Curve) -> Timed:
-    """Return the samples of a motion at its knots."""
-    return Timed(motion.knots, motion.q, motion.dq)
-
-
-def greatest_rates(motion: Curve) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the greatest velocity, acceleration and jerk of each joint, each of shape (7,).
-
-    Args:
-        motion: A cubic spline of the time [s].
-
-    Returns:
-        Velocities [rad/s], accelerations [rad/s^2], and the jerks between knots [rad/s^3].
-    """
-    step = np.diff(motion.knots)[:, None]
-    a, b, c, d = (
-        np.array(points)
-        for points in zip(*map(motion.control_points, range(motion.pieces)), strict=True)
-    )
-    before, middle, after = 3.0 * (b - a) / step, 3.0 * (c - b) / step, 3.0 * (d - c) / step
-    first, last = 2.0 * (middle - before) / step, 2.0 * (after - middle) / step
-    jerk = (last - first) / step
-    # Between knots the velocity is greatest where the acceleration is 0.
-    with np.errstate(divide="ignore", invalid="ignore"):
-        within = np.where(first * last < 0.0, first / (first - last), 0.0)
-    inside = before + step * within * (first + 0.5 * within * (last - first))
-    velocity = np.abs([before, inside, after])
-    greatest = velocity.max((0, 1)), np.abs([first, last]).max((0, 1)), np.abs(jerk).max(0)
-    return greatest
 
 
 def _averaged(steady: Timed, window: float) -> Curve:
@@ -151,15 +102,17 @@ def _spline_at_rest(knots: FloatArray, q: FloatArray) -> Curve:
     return Curve(knots, q, dq)
 
 
-def _within(motion: Curve, limits: RateLimits) -> Curve:
-    """Return a motion with equal steps, slowed down as a whole until it keeps the limits."""
-    velocity, acceleration, jerk = greatest_rates(motion)
-    slower = max(
-        1.0,
-        float(np.max(velocity / limits.velocity)),
-        float(np.max(acceleration / limits.acceleration)) ** (1.0 / 2.0),
-        float(np.max(jerk / limits.jerk)) ** (1.0 / 3.0),
-    )
-    step = motion.knots[1]
-    slower = float(np.ceil(slower * step / RESOLUTION)) * RESOLUTION / step
-    return Curve(motion.knots * slower, motion.q, motion.dq / slower)
+def _within(motion: Curve, limits: MotionLimits) -> Curve:
+    """Return a motion with equal steps, slowed down as a whole until it keeps the limits.
+
+    Its steps are whole multiples of the unit of time of files, which so hold the same curve.
+    """
+    per_second, steps = 10**DECIMALS, np.arange(len(motion.knots))
+    step = float(motion.knots[1]) * per_second
+    whole = int(np.ceil(step))
+    while True:
+        slow = Curve(whole * steps / per_second, motion.q, motion.dq * (step / whole))
+        excess = limits.slowing(slow)
+        if excess <= 1.0:
+            return slow
+        whole = max(whole + 1, int(np.ceil(excess * whole)))

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray
-from tcs.motion.approach import Access, Accesses, accesses, is_straight, joint_time
+from tcs.motion.approach import Access, Accesses, accesses, joint_time
 from tcs.motion.curves import Curve
+from tcs.motion.limits import MotionLimits
 from tcs.motion.motion_plan import GoalResult, Segment, StopPlan, joined
 from tcs.motion.paths import WIDEST_CORNER, find_path, is_certified, rounded
-from tcs.motion.smoothing import RateLimits, sampled, smoothed
+from tcs.motion.smoothing import smoothed
 from tcs.motion.stops import BodyPair, Stop
-from tcs.motion.timing import Timed, timed
+from tcs.motion.timing import Timed, motion_along
+from tcs.motion.tool_line import is_straight, tool_slowing
 from tcs.motion.tour import REST, best_tour, given_tour
 
-TimedCurve = tuple[Curve, Timed]
-"""A curve and its samples in time."""
+SAME_POSTURE = 1e-9
+"""Greatest difference of a posture from rest that is rounding [rad]."""
 ORDERS = {"best": best_tour, "given": given_tour}
 """Orders of the goals: that of the shortest tour, or their own."""
 
@@ -69,7 +72,8 @@ class _Tour:
 
     def __init__(self, stop: Stop, number: int, jerk: FloatArray) -> None:
         self.stop, self.number = stop, number
-        self.limits = RateLimits(stop.velocity, stop.acceleration, jerk)
+        joints = stop.motion.lower, stop.motion.upper
+        self.limits = MotionLimits(stop.velocity, stop.acceleration, jerk, *joints)
         self.found: dict[int, Accesses] = {}
         self.results: dict[int, GoalResult] = {}
         self.segments: list[Segment] = []
@@ -131,14 +135,22 @@ class _Tour:
         self._append("move", self.goal, goal, moves)
         self._append("approach", goal, goal, approach)
         self._append("retreat", goal, goal, retreat)
-        self.q, self.goal = self.segments[-1].curves[-1].q[-1], goal
+        self.q, self.goal = self.segments[-1].timing.positions[-1], goal
         self.results[goal] = GoalResult(goal, self.number, True, "")
 
     def go_home(self) -> bool:
-        """Append the motion back to rest; return whether there is one."""
+        """Append the motion back to rest, all full turns taken back; return whether there is one.
+
+        The next stop begins at rest, so the arm has to be there, not a full turn away.
+        """
         if self.goal is None:
             return True
-        path = self._path(self.stop.rest[None])
+        rest = self.stop.rest
+        path = self._path(rest[None])
+        if path is not None and np.max(np.abs(path[0][-1] - rest)) > SAME_POSTURE:
+            path = find_path(self.stop, self.q[None], rest[None], turns=False)
+        if path is not None:
+            path[0][-1] = rest
         moves = None if path is None else self._timed_path(path[0])
         if moves is None:
             return False
@@ -148,10 +160,8 @@ class _Tour:
     def _path(self, ends: FloatArray) -> tuple[FloatArray, int] | None:
         return find_path(self.stop, self.q[None], ends)
 
-    def _timed_path(self, path: FloatArray) -> list[TimedCurve] | None:
-        """Return the timed curves along a path, None if there are none within the jerk limits."""
-        if not self.limits.bound_jerk:
-            return [self._timed(curve) for curve in rounded(self.stop, path)]
+    def _timed_path(self, path: FloatArray) -> list[Curve] | None:
+        """Return the motions along a path, None if there are none within the limits."""
 
         def accepted(motion: Curve) -> bool:
             return is_certified(self.stop.motion, self.stop.work, motion)
@@ -159,33 +169,30 @@ class _Tour:
         # Along straight edges alone, the arm cuts no corner.
         for widest in (WIDEST_CORNER, 0.0):
             curves = rounded(self.stop, path, widest)
-            motions = [smoothed(curve, self.limits, accepted) for curve in curves]
-            found = [(motion, sampled(motion)) for motion in motions if motion is not None]
+            motions = [_motion(curve, self.limits, accepted) for curve in curves]
+            found = [motion for motion in motions if motion is not None]
             if len(found) == len(curves):
                 return found
         return None
 
-    def _timed_line(self, line: Curve) -> list[TimedCurve] | None:
-        """Return the timed curve along a straight motion of the tool, None as `_timed_path`."""
-        if not self.limits.bound_jerk:
-            return [self._timed(line)]
+    def _timed_line(self, line: Curve) -> list[Curve] | None:
+        """Return the motion along a straight line of the tool, None as `_timed_path`."""
         stop = self.stop
 
         def accepted(motion: Curve) -> bool:
-            return is_straight(stop, motion) and is_certified(stop.lines, stop.line_work, motion)
+            straight = is_straight(stop.lines, motion)
+            return straight and is_certified(stop.lines, stop.line_work, motion)
 
-        motion = smoothed(line, self.limits, accepted)
-        return None if motion is None else [(motion, sampled(motion))]
-
-    def _timed(self, curve: Curve) -> TimedCurve:
-        return curve, timed(curve, self.limits.velocity, self.limits.acceleration)
+        limits = replace(self.limits, other=lambda motion: tool_slowing(stop.lines, motion))
+        motion = _motion(line, limits, accepted)
+        return None if motion is None else [motion]
 
     def _append(
-        self, kind: str, start: int | None, end: int | None, parts: Sequence[TimedCurve]
+        self, kind: str, start: int | None, end: int | None, motions: Sequence[Curve]
     ) -> None:
-        if parts:
-            curves, timings = zip(*parts, strict=True)
-            self.segments.append(Segment(kind, start, end, curves, joined(timings)))
+        if motions:
+            timing = joined([Timed(motion.knots, motion.q, motion.dq) for motion in motions])
+            self.segments.append(Segment(kind, start, end, timing))
 
     def fail(
         self, goal: int, reason: str, pair: BodyPair | None, segment: str, begun: float
@@ -193,3 +200,8 @@ class _Tour:
         """Note that a goal cannot be done."""
         seconds = time.perf_counter() - begun
         self.results[goal] = GoalResult(goal, self.number, False, reason, pair, segment, seconds)
+
+
+def _motion(curve: Curve, limits: MotionLimits, accepted: Callable[[Curve], bool]) -> Curve | None:
+    """Return the motion along a curve, None if none within the limits is accepted."""
+    return (smoothed if limits.bound_jerk else motion_along)(curve, limits, accepted)

@@ -170,6 +170,9 @@ class Stop:
     """The scene of straight motions to and from goals."""
     line_work: MotionWorkspace
     trees: Trees
+    ignored: frozenset[BodyPair] = frozenset()
+    """Bodies of the robot and of the environment whose contact does not count while the arm rests,
+    as of base and furniture that stands elsewhere than assumed."""
 
     @classmethod
     def of(cls, job: Job, scene: Scene, configuration: int, seed: int) -> Stop:
@@ -312,5 +315,9 @@ class Stop:
 
     def rest_contact(self) -> BodyPair | None:
         """Return two bodies in contact while the arm rests, None if nothing touches."""
-        found = self.scene.violations()
-        return found[0][:2] if found else self.contact_at(self.rest)
+        found = self.resting_contacts()
+        return found[0] if found else self.contact_at(self.rest)
+
+    def resting_contacts(self) -> list[BodyPair]:
+        """Return the bodies that Drake finds in contact, without those that are ignored."""
+        return [pair[:2] for pair in self.scene.violations() if pair[:2] not in self.ignored]

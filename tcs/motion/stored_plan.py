@@ -15,8 +15,7 @@ from tcs.errors import StoreFormatError, TcsError, one_line
 from tcs.files.reading import read_text
 from tcs.kernel.arrays import FloatArray
 from tcs.model.grid import InitialConfiguration
-from tcs.motion.curves import Curve
-from tcs.motion.motion_plan import GoalResult, MotionPlan, Segment, StopPlan
+from tcs.motion.motion_plan import INTERPOLATION, GoalResult, MotionPlan, Segment, StopPlan
 from tcs.motion.timing import Timed
 
 MAX_BYTES = 256 * 1024**2
@@ -37,8 +36,6 @@ _STOP = (*_BASE, "configuration", "goals", "returns", "duration", "segments")
 
 def load_plan(path: str | os.PathLike[str]) -> MotionPlan:
     """Read a plan that was written as JSON.
-
-    The curves of its segments are the cubics through the samples.
 
     Args:
         path: The file.
@@ -63,6 +60,9 @@ def _plan(plain: Mapping[str, Any]) -> MotionPlan:
     made_from = plain["made_from"]
     if not isinstance(made_from, dict) or len(joints) != 7:
         raise ValueError("'made_from' must be a mapping and 'joints' seven names")
+    # Plans were without it at first.
+    if plain.get("interpolation", INTERPOLATION) != INTERPOLATION:
+        raise ValueError(f"'interpolation' must be '{INTERPOLATION}'")
     verified = plain["verified"]
     return MotionPlan(
         made_from=made_from,
@@ -120,8 +120,7 @@ def _segment(plain: Mapping[str, Any]) -> Segment:
     if times[0] != 0.0 or not np.all(np.diff(times) >= _LEAST_STEP):
         raise ValueError("the times of a segment must ascend from 0")
     start, end = (None if plain[key] == "rest" else _integer(plain[key]) for key in ("from", "to"))
-    curve = Curve(times, positions, velocities)
-    return Segment(plain["type"], start, end, (curve,), Timed(times, positions, velocities))
+    return Segment(plain["type"], start, end, Timed(times, positions, velocities))
 
 
 def _result(plain: Mapping[str, Any]) -> GoalResult:

@@ -32,7 +32,7 @@ def test_tasks_at_the_head_keep_out_of_the_space_before_the_face(task):
 
 def test_the_wall_counts_on_paths_alone(planned, stop):
     approach = planned.stops[0].segments[1]
-    at_goal, before = approach.curves[0].q[-1], approach.curves[0].q[0]
+    at_goal, before = approach.curve.q[-1], approach.curve.q[0]
     assert stop.contact_at(at_goal)[1] == "keep_out_0"
     assert stop.contact_at(before) is None
     assert posture_contact(stop.lines, stop.line_work, at_goal) == -1
@@ -59,7 +59,7 @@ def test_drake_refutes_a_path_through_the_wall(planned, stop):
     check = StopCheck(stop)
     approach = planned.stops[0].segments[1]
     assert check.false_pieces(approach) == 0
-    as_path = type(approach)("move", None, 0, approach.curves, approach.timing)
+    as_path = type(approach)("move", None, 0, approach.timing)
     assert check.false_pieces(as_path) > 0
 
 

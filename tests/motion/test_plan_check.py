@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import tcs
 from tcs.cli.app import app
 from tcs.errors import StoreFormatError, StoreMismatchError
-from tcs.motion import check_plan, load_plan, save_plan
+from tcs.kernel.motion.straight import OFF_LINE
+from tcs.model.tasks import TOOL_SPEED
+from tcs.motion import Stop, Timed, check_plan, load_plan, save_plan
+from tcs.motion.plan_check import LIMIT_BAR
+from tcs.motion.recheck import _is_within_limits
 from tcs.output.terminal.motion_tables import report_plan_check
+from tcs.placement.scoring.rebuild import rebuild_scene
 
 
 @pytest.fixture(scope="module")
@@ -20,6 +27,12 @@ def written(planned, tmp_path_factory):
     path = tmp_path_factory.mktemp("plan") / "plan.json"
     save_plan(path, planned)
     return path
+
+
+@pytest.fixture(scope="module")
+def stop(two_goals):
+    job, scene, _ = rebuild_scene(tcs.load(two_goals))
+    return Stop.of(job, scene, 0, seed=0)
 
 
 @pytest.fixture
@@ -43,13 +56,7 @@ def verify(path):
 
 
 def test_the_plan_is_read_back_as_it_was(planned, written):
-    plain, again = json.loads(written.read_text()), load_plan(written).to_json()
-    for one in (plain, again):
-        del one["stops"][0]["duration"]
-        for segment in one["stops"][0]["segments"]:
-            # A file holds rounded samples in place of the certified curves.
-            del segment["edges"], segment["duration"]
-    assert again == plain
+    assert load_plan(written).to_json() == json.loads(written.read_text())
 
 
 def test_a_plan_holds(written, capsys):
@@ -59,7 +66,9 @@ def test_a_plan_holds(written, capsys):
     assert (found["false"], found["jumps"], found["goals"]) == (0, 0, 1)
     assert found["edges"] > 50
     assert found["max_position_error"] < 1e-6
-    assert 0.3 < max(found["velocity"], found["acceleration"]) < 1.001
+    assert 0.9 < max(found["velocity"], found["acceleration"]) <= LIMIT_BAR
+    assert 0.09 < found["tool_speed"] <= TOOL_SPEED
+    assert found["max_line_error"] <= OFF_LINE
     report_plan_check(found)
     assert "the plan holds" in capsys.readouterr().out
 
@@ -79,6 +88,54 @@ def test_a_false_plan_is_found(changed):
     assert found["jumps"] == 2
     assert found["max_position_error"] > 0.1
     assert "do not use it" in ran.stderr
+
+
+@pytest.mark.parametrize(
+    ("key", "most", "change"),
+    [
+        # Cubics that overshoot between samples, whose velocities are within the limits.
+        ("acceleration", LIMIT_BAR, lambda s: s["velocities"][3].__setitem__(0, 0.9)),
+        ("tool_speed", LIMIT_BAR * TOOL_SPEED, lambda s: s.update(_faster(s))),
+        ("max_line_error", OFF_LINE, lambda s: s["positions"][3].__setitem__(1, _beside(s))),
+        ("jumps", 0, lambda s: s["velocities"][-1].__setitem__(0, 0.01)),
+    ],
+)
+def test_a_plan_that_breaks_one_promise_between_samples_is_false(key, most, change, changed):
+    found = check_plan(load_plan(changed(lambda plain: change(plain["stops"][0]["segments"][1]))))
+    assert found.to_json()[key] > most
+    assert not found.is_sound
+
+
+def _faster(segment):
+    """Return a segment that takes 2 % less time at the same speeds."""
+    return {"times": (0.98 * np.array(segment["times"])).tolist()}
+
+
+def _beside(segment):
+    return segment["positions"][3][1] + 0.002
+
+
+def test_a_plan_a_full_turn_away_from_rest_is_false(changed):
+    def turned(plain):
+        for segment in plain["stops"][0]["segments"]:
+            q = np.array(segment["positions"])
+            q[:, 4] += 2.0 * np.pi
+            segment["positions"] = q.tolist()
+
+    found = check_plan(load_plan(changed(turned)))
+    # It neither begins at rest nor returns there.
+    assert (found.false, found.jumps, found.is_sound) == (0, 2, False)
+
+
+def test_a_plan_beyond_a_joint_limit_between_samples_is_false(written, stop):
+    segment = load_plan(written).stops[0].segments[0]
+    limit = float(stop.scene.arm_limits[1][1])
+    q = np.tile(stop.rest, (2, 1))
+    q[:, 1], v = limit - 1e-4, np.zeros((2, 7))
+    v[:, 1] = 0.4, -0.4
+    over = replace(segment, timing=Timed(np.array([0.0, 0.01]), q, v)).curve
+    assert not _is_within_limits(stop.scene, over, 0)
+    assert _is_within_limits(stop.scene, replace(over, dq=0.1 * v), 0)
 
 
 def test_a_plan_for_other_models_is_refused(changed):
@@ -102,6 +159,7 @@ def test_a_plan_for_other_models_is_refused(changed):
         lambda plain: plain["stops"][0]["segments"][1].update(to=float("inf")),
         lambda plain: plain["stops"][0]["segments"][1].update(to=0.5),
         lambda plain: plain.update(seed="0"),
+        lambda plain: plain.update(interpolation="linear"),
         # Larger than a floating-point number.
         lambda plain: plain["stops"][0]["segments"][0]["times"].__setitem__(1, 10**400),
         lambda plain: plain["stops"][0].update(base_x=10**400),

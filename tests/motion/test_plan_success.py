@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -11,7 +13,9 @@ from tcs.cli.app import app
 from tcs.errors import TcsError
 from tcs.model.scene import ErrorDistribution
 from tcs.motion import evaluate_plan, save_plan
+from tcs.motion.plan_success import _Place
 from tcs.output.terminal.robustness_tables import report_plan_success
+from tcs.placement.scoring.rebuild import rebuild_made_from
 
 
 def off(joint, std):
@@ -28,6 +32,32 @@ def test_motions_stay_free_where_nothing_moves_and_not_where_the_person_does(pla
     assert 0.0 <= found["blind"]["mean"] < 1.0
     assert found["blind"]["ci95"][0] <= found["blind"]["mean"] <= found["blind"]["ci95"][1]
     assert found["blind"]["per_stop"] == [found["blind"]["mean"]]
+
+
+def test_a_goal_that_is_lost_at_its_stop_is_tried_from_the_others(planned):
+    (stop,) = planned.stops
+    far = replace(stop, at=replace(stop.at, base_x=stop.at.base_x + 3.0))
+    both = replace(planned, stops=(far, stop))
+    found = evaluate_plan(both, samples=1, errors=off("person_y", 1e-9))
+    assert found.replanned.tolist() == [[True, True]]
+    alone = evaluate_plan(replace(planned, stops=(far,)), samples=1, errors=off("person_y", 1e-9))
+    assert alone.replanned.tolist() == [[False]]
+
+
+def test_the_base_may_touch_the_furniture_alone(planned):
+    job, scene = rebuild_made_from(planned.made_from)
+    place = _Place.of(planned.stops[0], job, scene)
+    met = set()
+    # The wheelchair comes nearer to the robot, until its wheel meets the base.
+    for y in np.arange(0.0, 0.75, 0.15):
+        stop = place.displaced({"wheelchair_y": -float(y)}, 0)
+        found = {pair[:2] for pair in scene.violations()}
+        met |= found
+        assert set(stop.resting_contacts()) == {
+            pair for pair in found if pair[0] != "base_link" or pair[1].startswith("person::")
+        }
+    assert any(pair in stop.ignored for pair in met)
+    assert any(pair not in stop.ignored for pair in met)
 
 
 @pytest.mark.slow

@@ -9,13 +9,16 @@ import re
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicHermiteSpline
 
 import tcs
 from tcs.errors import OutputError, TcsError
 from tcs.kernel.motion.edges import certified
 from tcs.model.scene import NeighbourList
+from tcs.model.tasks import TOOL_SPEED
 from tcs.motion import Stop, recheck, save_plan
 from tcs.motion.recheck import false_pieces
+from tcs.motion.stop_tour import _Tour
 from tcs.output.terminal.motion_tables import report_plan
 from tcs.placement.scoring.rebuild import rebuild_scene
 
@@ -32,15 +35,24 @@ def test_the_arm_goes_from_rest_straight_in_and_out_and_back(planned, stop):
     assert [segment.type for segment in segments] == ["move", "approach", "retreat", "move"]
     assert [(s.start, s.end) for s in segments] == [(None, 0), (0, 0), (0, 0), (0, None)]
     np.testing.assert_array_equal(segments[0].timing.positions[0], stop.rest)
-    # A joint without limits may have taken a full turn.
-    turned = segments[-1].timing.positions[-1] - stop.rest
-    np.testing.assert_allclose(np.sin(0.5 * turned), 0.0, atol=1e-9)
+    np.testing.assert_array_equal(segments[-1].timing.positions[-1], stop.rest)
     for before, after in itertools.pairwise(segments):
         np.testing.assert_allclose(
             before.timing.positions[-1], after.timing.positions[0], atol=1e-12
         )
+        assert not np.any([before.timing.velocities[-1], after.timing.velocities[0]])
     assert at_stop.returns
     assert at_stop.goals == (0,)
+
+
+def test_the_motion_back_to_rest_takes_full_turns_back(stop):
+    tour = _Tour(stop, 0, np.full(7, np.inf))
+    turns = np.where(stop.motion.period > 0.0, 2.0 * np.pi, 0.0)
+    tour.q, tour.goal = stop.rest + turns, 0
+    assert (np.count_nonzero(turns), tour.go_home()) == (2, True)
+    (home,) = tour.segments
+    np.testing.assert_array_equal(home.timing.positions[0], stop.rest + turns)
+    np.testing.assert_array_equal(home.timing.positions[-1], stop.rest)
 
 
 def test_a_plan_of_one_stop_reports_its_progress_and_can_be_cancelled(two_goals):
@@ -83,13 +95,13 @@ def test_every_piece_is_certified_and_drake_refutes_none(planned, stop):
         # Straight motions may enter the boxes that paths keep out of.
         is_path = segment.type == "move"
         scene = (stop.motion, stop.work) if is_path else (stop.lines, stop.line_work)
-        for curve in segment.curves:
-            for piece in range(curve.pieces):
-                assert certified(*scene, curve.control_points(piece)) == 1.0
+        curve = segment.curve
+        for piece in range(curve.pieces):
+            assert certified(*scene, curve.control_points(piece)) == 1.0
 
 
 def test_drake_refutes_a_curve_through_the_person(planned, stop):
-    approach = planned.stops[0].segments[1].curves[0]
+    approach = planned.stops[0].segments[1].curve
     # 30 cm beyond the goal, the tool would be in the head.
     beyond = approach.shifted(3.0 * (approach.q[-1] - approach.q[0]))
     neighbours = NeighbourList(stop.scene)
@@ -99,19 +111,31 @@ def test_drake_refutes_a_curve_through_the_person(planned, stop):
 
 def test_drake_checks_at_most_a_step_of_motion_apart(planned, stop):
     for segment in planned.stops[0].segments:
-        for curve in segment.curves:
-            for piece in range(curve.pieces):
-                at = recheck.dense_fractions(stop.motion, curve, piece)
-                assert (at[0], at[-1]) == (0.0, 1.0)
-                corners = recheck.shape_corners(stop.motion, curve.points(piece, at))
-                steps = np.linalg.norm(np.diff(corners, axis=0), axis=2).max(axis=1)
-                assert steps.max() <= recheck.LARGEST_STEP
+        curve = segment.curve
+        for piece in range(curve.pieces):
+            at = recheck.dense_fractions(stop.motion, curve, piece)
+            assert (at[0], at[-1]) == (0.0, 1.0)
+            corners = recheck.shape_corners(stop.motion, curve.points(piece, at))
+            steps = np.linalg.norm(np.diff(corners, axis=0), axis=2).max(axis=1)
+            assert steps.max() <= recheck.LARGEST_STEP
 
 
-def test_straight_motions_are_no_faster_than_the_tool_speed(planned):
-    approach = planned.stops[0].segments[1]
-    assert approach.timing.duration >= 1.0
-    assert np.all(approach.timing.velocities[[0, -1]] == 0.0)
+def test_every_limit_holds_between_samples(planned, stop):
+    lower, upper = stop.scene.arm_limits
+    for segment in planned.stops[0].segments:
+        timing = segment.timing
+        spline = CubicHermiteSpline(timing.times, timing.positions, timing.velocities)
+        at = np.linspace(0.0, timing.duration, 20_000)
+        assert np.all((spline(at) >= lower - 1e-12) & (spline(at) <= upper + 1e-12))
+        assert np.all(np.abs(spline(at, 1)) <= stop.velocity * (1.0 + 1e-9))
+        assert np.all(np.abs(spline(at, 2)) <= stop.acceleration * (1.0 + 1e-9))
+        if segment.type == "move":
+            continue
+        fastest = 0.0
+        for q, v in zip(spline(at[::20]), spline(at[::20], 1), strict=True):
+            stop.scene.set_arm(q)
+            fastest = max(fastest, float(np.linalg.norm(stop.scene.tool_jacobian()[3:] @ v)))
+        assert 0.99 * TOOL_SPEED < fastest <= TOOL_SPEED
 
 
 def test_the_same_seed_gives_the_same_plan_of_the_best_set(planned, two_goals, tcs_plan, tmp_path):

@@ -12,10 +12,12 @@ import tcs
 from tcs.errors import TcsError
 from tcs.motion import check_plan, load_plan, save_plan
 from tcs.motion.curves import Curve
-from tcs.motion.smoothing import RateLimits, greatest_rates, smoothed
+from tcs.motion.limits import MotionLimits
+from tcs.motion.limits import rates as rates_of
+from tcs.motion.smoothing import smoothed
 from tests.motion.paths import bent, straight
 
-LIMITS = RateLimits(np.full(7, 2.0), np.full(7, 4.0), np.full(7, 16.0))
+LIMITS = MotionLimits(np.full(7, 2.0), np.full(7, 4.0), np.full(7, 16.0))
 
 
 def always(_):
@@ -45,8 +47,8 @@ def test_random_motions_keep_every_limit_and_begin_and_end_at_rest(rng):
         for limit in (limits.velocity, limits.acceleration, limits.jerk):
             rates.append(np.diff(rates[-1], axis=0) / step)
             assert np.all(np.abs(rates[-1]) <= limit * 1.001 + 1e-6)
-        for found, expected in zip(greatest_rates(motion), rates[1:], strict=True):
-            np.testing.assert_allclose(found, np.abs(expected).max(axis=0), rtol=0.08)
+        for found, expected in zip(rates_of(motion), rates[1:], strict=True):
+            np.testing.assert_allclose(found.max(axis=0), np.abs(expected).max(axis=0), rtol=0.08)
 
 
 def test_joints_without_a_jerk_limit_do_not_slow_the_others_down():

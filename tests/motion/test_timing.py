@@ -3,52 +3,96 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicHermiteSpline
 
+from tcs.motion.cubics import at_times, extremes
 from tcs.motion.curves import Curve
-from tcs.motion.timing import timed
+from tcs.motion.limits import MotionLimits, rates
+from tcs.motion.timing import SAMPLE_SECONDS, Timed, motion_along, timed
 from tcs.motion.tour import EXACT, REST, best_tour
 from tests.motion.paths import bent, straight
 
 VELOCITY, ACCELERATION = np.full(7, 2.0), np.full(7, 4.0)
+LIMITS = MotionLimits(VELOCITY, ACCELERATION, np.full(7, np.inf))
+
+
+def motion(curve, limits=LIMITS):
+    return motion_along(curve, limits, lambda _: True)
 
 
 @pytest.mark.parametrize(("length", "seconds"), [(0.25, 0.5), (3.0, 2.0)])
 def test_a_straight_line_takes_the_time_of_a_trapezoid(length, seconds):
     # Without reaching the velocity limit 2 sqrt(s / a), else s / v + v / a. The intervals of the
     # parameter cost a little.
-    duration = timed(straight(length), VELOCITY, ACCELERATION).duration
-    assert seconds - 1e-9 <= duration < 1.02 * seconds
+    found = motion(straight(length))
+    assert seconds - 1e-9 <= found.knots[-1] < 1.02 * seconds
+    assert np.max(np.diff(found.knots)) <= SAMPLE_SECONDS + 1e-9
 
 
-def test_samples_keep_the_limits_and_stop_at_both_ends():
-    timing = timed(bent(), VELOCITY, ACCELERATION)
-    np.testing.assert_array_equal(timing.positions[[0, -1]], bent().q[[0, -1]])
-    assert np.all(timing.velocities[[0, -1]] == 0.0)
-    assert np.all(np.abs(timing.velocities) <= VELOCITY + 1e-9)
-    steps = np.diff(timing.times)[:, None]
-    assert np.all(np.abs(np.diff(timing.velocities, axis=0) / steps) <= ACCELERATION + 1e-9)
-    # Positions are the integral of the velocities, to the second order of the sampling step.
-    mean = (timing.velocities[1:] + timing.velocities[:-1]) / 2
-    np.testing.assert_allclose(np.diff(timing.positions, axis=0) / steps, mean, atol=0.1)
+def assert_within(found, limits):
+    """Check cubics against limits at many points between their knots, by scipy."""
+    spline = CubicHermiteSpline(found.knots, found.q, found.dq)
+    at = np.unique([np.linspace(a, b, 40) for a, b in itertools.pairwise(found.knots)])
+    assert np.all(np.abs(spline(at, 1)) <= limits.velocity * (1.0 + 1e-9))
+    assert np.all(np.abs(spline(at, 2)) <= limits.acceleration * (1.0 + 1e-9))
+    assert np.all(spline(at) <= limits.upper + 1e-12)
+    assert np.all(spline(at) >= limits.lower - 1e-12)
 
 
-def test_random_curves_keep_the_limits(rng):
+def test_the_cubics_keep_the_limits_and_stop_at_both_ends():
+    found = motion(bent())
+    np.testing.assert_array_equal(found.q[[0, -1]], bent().q[[0, -1]])
+    assert np.all(found.dq[[0, -1]] == 0.0)
+    assert_within(found, LIMITS)
+    assert np.max(rates(found).acceleration) > 0.99 * ACCELERATION[0]
+
+
+def test_random_curves_keep_the_limits_between_samples(rng):
     for _ in range(20):
         knots = np.concatenate([[0.0], np.cumsum(rng.uniform(0.01, 1.0, 6))])
         curve = Curve(knots, rng.normal(size=(7, 7)), rng.normal(size=(7, 7)))
-        timing = timed(curve, VELOCITY, ACCELERATION)
-        assert np.all(np.abs(timing.velocities) <= VELOCITY * 1.001)
-        rates = np.diff(timing.velocities, axis=0) / np.diff(timing.times)[:, None]
-        assert np.all(np.abs(rates) <= ACCELERATION * 1.001)
+        found = motion(curve)
+        assert_within(found, LIMITS)
+        assert found.knots[-1] < 1.05 * timed(curve, VELOCITY, ACCELERATION, 0.05).duration
+
+
+def test_a_motion_along_a_joint_limit_does_not_cross_it():
+    # The second joint arrives at its limit and rests there, as on lines of the tool.
+    a, b = np.eye(7)[:2]
+    q = np.array([0 * a, 0.5 * a + 0.1 * b, a + 0.1 * b])
+    curve = Curve(np.array([0.0, 0.5, 1.0]), q, np.array([a + 0.4 * b, a, a]))
+    limits = replace(LIMITS, upper=np.where(np.arange(7) == 1, 0.1, np.inf))
+    assert_within(motion(curve, limits), limits)
+
+
+def test_the_measure_of_a_check_finds_what_is_between_samples(rng):
+    times = np.cumsum(np.append(0.0, rng.uniform(0.01, 0.1, 9)))
+    timing = Timed(times, rng.normal(size=(10, 7)), rng.normal(size=(10, 7)))
+    spline = CubicHermiteSpline(times, timing.positions, timing.velocities)
+    at = np.unique([np.linspace(a, b, 2001)[:-1] for a, b in itertools.pairwise(times)])
+    found, by_rates = extremes(timing), rates(Curve(times, timing.positions, timing.velocities))
+    for one, expected in (
+        (found.least, spline(at).min(axis=0)),
+        (found.greatest, spline(at).max(axis=0)),
+        (found.velocity, np.abs(spline(at, 1)).max(axis=0)),
+        (found.acceleration, np.abs(spline(at, 2)).max(axis=0)),
+        (by_rates.velocity.max(axis=0), found.velocity),
+        (by_rates.acceleration.max(axis=0), found.acceleration),
+    ):
+        np.testing.assert_allclose(one, expected, rtol=2e-3, atol=1e-4)
+    q, v = at_times(timing, at)
+    np.testing.assert_allclose(q, spline(at), atol=1e-9)
+    np.testing.assert_allclose(v, spline(at, 1), atol=1e-9)
 
 
 def test_scaling_the_limits_scales_the_time():
-    slow = timed(bent(), VELOCITY, ACCELERATION).duration
-    fast = timed(bent(), 2.0 * VELOCITY, 4.0 * ACCELERATION).duration
-    assert fast == pytest.approx(slow / 2.0, rel=1e-3)
+    fast = replace(LIMITS, velocity=2.0 * VELOCITY, acceleration=4.0 * ACCELERATION)
+    slow, quick = motion(bent()).knots[-1], motion(bent(), fast).knots[-1]
+    assert quick == pytest.approx(slow / 2.0, rel=1e-3)
 
 
 def test_reversing_a_curve_reverses_its_points():

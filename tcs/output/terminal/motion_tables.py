@@ -68,4 +68,6 @@ def report_plan_check(result: Mapping[str, Any]) -> None:
         f"{result['max_position_error']:.1e} m; at most {result['velocity']:.1%} of the velocity "
         f"limits and {result['acceleration']:.1%} of the acceleration limits"
         + ("" if result["jerk"] is None else f", {result['jerk']:.1%} of the jerk limits")
+        + f"; straight motions within {result['max_line_error']:.1e} m and rad of their lines, "
+        f"the tool at most at {result['tool_speed']:.4f} m/s"
     )

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from tcs.cli.app import app
 from tcs.model.grid import InitialConfiguration
-from tcs.motion import Curve, GoalResult, MotionPlan, Segment, StopPlan, Timed, save_plan
+from tcs.motion import GoalResult, MotionPlan, Segment, StopPlan, Timed, save_plan
 from tcs.output.view import PlanView, make_plan_view, plan_view, swept, write_plan_view
 from tcs.output.view.plan_view import plan_frames, show_plan_view
 from tcs.output.view.scene_objects import SceneShapes
@@ -27,7 +27,7 @@ def segment(name, start, end, first, last, seconds):
     times, q = np.linspace(0.0, seconds, 9), np.linspace(first, last, 9)
     v = np.tile((last - first) / seconds, (9, 1))
     v[[0, -1]] = 0.0
-    return Segment(name, start, end, (Curve(times, q, v),), Timed(times, q, v))
+    return Segment(name, start, end, Timed(times, q, v))
 
 
 @pytest.fixture(scope="module")
