@@ -15,7 +15,7 @@ from tcs.errors import StoreFormatError, StoreMismatchError
 from tcs.kernel.motion.straight import OFF_LINE
 from tcs.model.tasks import TOOL_SPEED
 from tcs.motion import Stop, Timed, check_plan, load_plan, save_plan
-from tcs.motion.plan_check import LIMIT_BAR
+from tcs.motion.plan_check import LIMIT_BAR, _jumps
 from tcs.motion.recheck import _is_within_limits
 from tcs.output.terminal.motion_tables import report_plan_check
 from tcs.placement.scoring.rebuild import rebuild_scene
@@ -97,11 +97,17 @@ def test_a_false_plan_is_found(changed):
         ("acceleration", LIMIT_BAR, lambda s: s["velocities"][3].__setitem__(0, 0.9)),
         ("tool_speed", LIMIT_BAR * TOOL_SPEED, lambda s: s.update(_faster(s))),
         ("max_line_error", OFF_LINE, lambda s: s["positions"][3].__setitem__(1, _beside(s))),
-        ("jumps", 0, lambda s: s["velocities"][-1].__setitem__(0, 0.01)),
+        # One jump is that from rest.
+        ("jumps", 1, lambda s: s["velocities"][-1].__setitem__(0, 0.01)),
     ],
 )
 def test_a_plan_that_breaks_one_promise_between_samples_is_false(key, most, change, changed):
-    found = check_plan(load_plan(changed(lambda plain: change(plain["stops"][0]["segments"][1]))))
+    def alone(plain):
+        segment = plain["stops"][0]["segments"][1]
+        plain["stops"][0] |= {"segments": [segment], "returns": False}
+        change(segment)
+
+    found = check_plan(load_plan(changed(alone)))
     assert found.to_json()[key] > most
     assert not found.is_sound
 
@@ -115,16 +121,16 @@ def _beside(segment):
     return segment["positions"][3][1] + 0.002
 
 
-def test_a_plan_a_full_turn_away_from_rest_is_false(changed):
+def test_a_plan_a_full_turn_away_from_rest_has_jumps(changed, written, stop):
     def turned(plain):
         for segment in plain["stops"][0]["segments"]:
             q = np.array(segment["positions"])
             q[:, 4] += 2.0 * np.pi
             segment["positions"] = q.tolist()
 
-    found = check_plan(load_plan(changed(turned)))
     # It neither begins at rest nor returns there.
-    assert (found.false, found.jumps, found.is_sound) == (0, 2, False)
+    assert _jumps(load_plan(changed(turned)).stops[0], stop) == 2
+    assert _jumps(load_plan(written).stops[0], stop) == 0
 
 
 def test_a_plan_beyond_a_joint_limit_between_samples_is_false(written, stop):
