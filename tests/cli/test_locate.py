@@ -63,7 +63,6 @@ def test_selection_from_a_located_table(tcs_command, small_file, located):
     assert given["members"] == result["members"]
     assert "located at x" in tcs_command(*words).out
     assert tcs_command("select", small_file, "--located", located).code == 2
-    assert tcs_command("select", small_file).code == 2
     assert tcs_command("select", small_file, "--here", 1, 0, 0, "--task-at", 0, 0, 0).code == 2
 
 
