@@ -222,6 +222,47 @@ def test_the_scene_is_changed_by_pointer_and_keys_and_scored_again(page):
     page.wait(lambda: script(shown) == before)
 
 
+def test_the_scene_in_space_says_that_it_is_the_one_before(page):
+    script = page.driver.execute_script
+    page.wait(lambda: not script("return document.getElementById('editing').hidden"))
+    page.wait(lambda: script("return document.getElementById('building').hidden"))
+    pale = "return Number(getComputedStyle(document.getElementById('canvas3d')).opacity) < 0.5"
+    assert not script(pale)
+    script("document.getElementById('addPiece').click()")
+    assert script(pale)
+    assert not script("return document.getElementById('building').hidden")
+    page.wait(lambda: script("return document.getElementById('building').hidden"))
+    assert script("return document.body.dataset.rescored")
+    assert not script(pale)
+
+
+def test_undo_shows_the_state_that_its_sliders_say(browser, tmp_path):
+    grid = {"base_x": (1.5, 0.2, 2), "base_y": (0.5, 0.2, 2), "base_yaw": (180, 90, 1)}
+    grid |= {"torso": (0.15, 0.15, 1), "bed_height": (0.0, 0.1, 1), "head_rest": (0, 40, 2)}
+    environment = write_environment(tmp_path, "beds", grid, based_on="bed")
+    script = browser.driver.execute_script
+    with Engine() as engine:
+        scores = tcs.score("shaving", environment=str(environment), approach=False)
+        tcs.save(tmp_path / "beds.tcs", scores)
+        engine.open_file(tmp_path / "beds.tcs")
+        application = make_application(engine, Access())
+        add_page(application)
+        with Server(application, host="127.0.0.1", port=0) as server:
+            browser.driver.get("about:blank")
+            browser.driver.get(f"{server.url}/#language=en")
+            browser.wait(lambda: not script("return document.getElementById('editing').hidden"))
+            one = "const one = document.querySelector('#sliders [data-name=head_rest_deg]');"
+            moves = f"{one} one.value = 30; one.oninput(); one.onchange()"
+            scored_again(browser, lambda: script(moves))
+            script("document.getElementById('undo').click()")
+            # The nearest state of the table, in the sliders and in what is asked.
+            browser.wait(lambda: script(f"{one} return one.value") == "40")
+            browser.wait(lambda: "state=1" in script("return location.hash"))
+            assert "at=" not in script("return location.hash")
+            browser.driver.get("about:blank")
+    assert browser.complaints() == []
+
+
 def test_the_3d_view_follows_and_motions_are_played(page):
     script = page.driver.execute_script
     picture = (

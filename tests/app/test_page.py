@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import re
+import shutil
+import subprocess
 from importlib.resources import files
 
 import httpx
@@ -86,3 +89,24 @@ def test_other_languages_name_every_frame_and_goal_that_ships():
     for language in LANGUAGES[1:]:
         assert {goal.name for goal in goals if goal.name} <= set(TEXTS[language]["goalNames"])
         assert {goal.body_frame for goal in goals} <= set(TEXTS[language]["frames"])
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="needs node")
+def test_a_badge_is_as_wide_as_its_numbers_and_within_the_picture():
+    script = """
+    const {grouped, whole} = await import(process.argv[1]);
+    const at = (number, x) => ({number, at: [x, 0], reached: true});
+    const badges = [[9, 10, 11].map(n => at(n, 0)), [at(12, 0)], [at(3, 0)]]
+      .map(m => grouped(m, 1)[0]);
+    console.log(JSON.stringify([badges.map(b => [b.text, b.wide]),
+      [whole(1, 2, 0, 10), whole(9, 2, 0, 10), whole(5, 2, 0, 10), whole(-1, 2, 0, 10)]]));
+    """
+    marks = PAGE.joinpath("marks.js").read_bytes()
+    # Without a package.json, node takes the page's modules for what they are not.
+    url = "data:text/javascript;base64," + base64.b64encode(marks).decode()
+    command = ["node", "--input-type=module", "-e", script, url]
+    badges, moved = json.loads(subprocess.run(command, capture_output=True, check=True).stdout)
+    for text, wide in badges:
+        # A digit is about 0.6 times as wide as the font is high, and a badge higher than its font.
+        assert wide >= 0.55 * len(text)
+    assert moved == [2, 8, 5, -1]

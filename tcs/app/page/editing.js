@@ -243,6 +243,8 @@ export class Editing {
     const one = { file: this.view.file, ...changes, at: { ...this.view.at, ...this.at }, only_state: true };
     const isOne = this.view.states.length < 2;
     by("changed").textContent = t("rescoring");
+    this.view.outdated();
+    const isWanted = () => run === this.run;
     document.body.setAttribute("aria-busy", "true");
     const begun = performance.now();
     const seconds = () => ((performance.now() - begun) / 1000).toFixed(1);
@@ -250,21 +252,22 @@ export class Editing {
       if (this.view.size >= LARGE) {
         const some = await this.#scored({ ...one, every: 2, around: this.view.place, max_members: 1 }, run);
         if (!some) return;
-        await this.view.scored(some, { isOne: true, isFirst: true, state: one.at });
+        await this.view.scored(some, { isOne: true, isFirst: true, state: one.at, isWanted });
         if (run !== this.run) return;
         by("changed").textContent = t("rescoredFirst", { seconds: seconds() });
         document.body.dataset.answered = seconds();
       }
       const first = await this.#scored(one, run);
       if (!first) return;
-      await this.view.scored(first, { isOne: true, state: one.at });
+      await this.view.scored(first, { isOne: true, state: one.at, isWanted });
       if (run !== this.run) return;
       by("changed").textContent = t(this.at || isOne ? "rescored" : "rescoredOne", { seconds: seconds() });
       document.body.dataset.rescored = seconds();
       if (isOne || this.at) return;
       const whole = await this.#scored({ file: this.view.file, ...changes }, run);
       if (!whole) return;
-      await this.view.scored(whole, { isOne: false, state: one.at });
+      await this.view.scored(whole, { isOne: false, state: one.at, isWanted });
+      if (run !== this.run) return;
       by("changed").textContent = t("rescoredAll");
     } catch (error) {
       if (run === this.run) {

@@ -34,7 +34,7 @@ const editing = new Editing(map, things, {
   get states() { return whole.floors.find(Boolean).states; },
   get size() { return sizeOf(whole.floors.find(Boolean)); },
   get place() { return [map.pose.x, map.pose.y]; },
-  fault, moved, redraw: showScene, restore, scored, nearest,
+  fault, moved, redraw: showScene, restore, scored, nearest, outdated,
 });
 
 const view3d = new View3d(by("canvas3d"), by("marks3d"));
@@ -157,13 +157,14 @@ function links() {
 }
 
 // Shows scores of the changed scene: of the visible state alone, or of all. A first answer has every second base position, the one of
-// the robot among them.
-async function scored(digest, { isOne, state, isFirst = false }) {
+// the robot among them. `isWanted` says whether the change is still the last one.
+async function scored(digest, { isOne, state, isFirst = false, isWanted }) {
   page.rescored.add(digest);
   const states = whole.floors.find(Boolean).states;
   const number = isOne ? 0 : states.findIndex((one) => isSame(one, state));
   const next = shownFile(digest, number);
   await floorOf(next, number);
+  if (!isWanted()) return;
   view = next;
   if (!isFirst && (!isOne || states.length < 2)) whole = next;
   await shownAnew(isFirst);
@@ -190,13 +191,14 @@ async function shownAnew(isFirst = false) {
   await move(map.pose, { isFirst });
 }
 
-// Goes back to the file as it was scored, in the present state.
+// Goes back to the file as it was scored, in the present state or the one that is nearest to it.
 async function restore() {
   const state = at();
   view = whole = page.original;
   const { states } = await floorOf(view, 0);
-  view.state = Math.max(states.findIndex((one) => isSame(one, state)), 0);
+  view.state = stateOf(state, states);
   await floorOf(view, view.state);
+  editing.say();
   await shownAnew();
   otherStates(view).catch(fault);
 }
@@ -243,7 +245,7 @@ async function sceneOf(shown, moves = {}, only = null) {
   const scene = done.result;
   const person = scene.things.find((one) => one.category === "person")?.name;
   for (const state of scene.states.filter(Boolean)) {
-    state.outlines = state.outlines.filter((one) => !things.isAdded(one.thing.replace(/_[bc]$/, "")));
+    state.outlines = state.outlines.filter((one) => !things.isAdded(one.thing.replace(/_[b-e]$/, "")));
     for (const one of state.outlines) one.points = one.points.map((point) => things.unmoved(one.thing, point, moves));
     state.goals = state.goals.map(([x, y, z]) => [...things.unmoved(person, [x, y], moves), z]);
   }
@@ -312,6 +314,14 @@ async function changeState(state) {
   await move(map.pose);
 }
 
+const shownNow = () => `${view.file} ${view.state}`;
+
+// What is in space is not what the rest of the page shows: says so until it is drawn anew.
+function outdated() {
+  by("building").hidden = false;
+  by("canvas3d").dataset.old = "yes";
+}
+
 // Shows the place in space, the arm at the chosen goal or at the one of greatest dexterity.
 async function space() {
   playing.clear();
@@ -320,9 +330,12 @@ async function space() {
   view3d.contact = [];
   const number = page.asked;
   const goal = by("armAt").value;
+  const drawn = shownNow();
   const found = await post("posture", { ...placed(), ...(goal ? { goal: Number(goal) } : {}) });
   if (number !== page.asked) return;
   by("building").hidden = true;
+  delete by("canvas3d").dataset.old;
+  page.drawn = drawn;
   view3d.map(map.canvas, map.painted);
   view3d.scene(found, page.outcome.goals);
   if (page.lookedAt !== file().file) view3d.look(found.goals, [map.pose.x, map.pose.y]);
@@ -336,6 +349,7 @@ async function move(pose, { best = false, torso = page.torso, isFirst = false } 
   const { x, y } = map.within(pose);
   pose = { x, y };
   map.place({ x, y, yaw });
+  if (page.drawn !== shownNow()) outdated();
   const number = ++page.asked;
   const request = { file: view.file, here: [pose.x, pose.y, yaw], torso, at: at(), best };
   let outcome;
@@ -415,9 +429,9 @@ async function fixOf(goal) {
 }
 
 // Returns the number of the state of the environment that is nearest to that of a configuration.
-function stateOf(member) {
+function stateOf(member, states = floor().states) {
   const distance = (settings) => Object.entries(settings).reduce((sum, [name, value]) => sum + Math.abs(member[name] - value) / (name.endsWith("_deg") ? 60 : 1), 0);
-  return floor().states.reduce((best, settings, i, all) => (distance(settings) < distance(all[best]) ? i : best), 0);
+  return states.reduce((best, settings, i, all) => (distance(settings) < distance(all[best]) ? i : best), 0);
 }
 
 // Shows a configuration: its base pose, torso height and state of the environment.

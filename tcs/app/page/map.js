@@ -1,6 +1,6 @@
 // The map of the floor: scores as colours, furniture and person to scale, the robot to drag and turn.
 
-import { MARKS, grouped } from "./marks.js";
+import { MARKS, grouped, whole } from "./marks.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 const SCALE = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]]; // viridis
@@ -152,9 +152,10 @@ export class FloorMap {
   // Goals as numbered marks: a disc where reached, a square where not.
   marks(goals) {
     this.goals.replaceChildren();
-    for (const { at, text, reached, count } of grouped(goals, 0.06)) {
-      const [x, y] = [at[0], -at[1]];
-      const half = 0.05 + 0.05 * (count - 1);
+    const { left, right, low, high } = this.bounds;
+    for (const { at, text, reached, wide } of grouped(goals, 0.06)) {
+      const half = 0.05 * wide;
+      const [x, y] = [whole(at[0], half, left, right), -whole(at[1], 0.05, low, high)];
       const outline = { fill: reached ? MARKS.reached : MARKS.unreached, stroke: "#fff", "stroke-width": 0.012 };
       element("rect", { x: x - half, y: y - 0.05, width: 2 * half, height: 0.1, rx: reached ? 0.05 : 0, ...outline }, this.goals);
       element("text", { x, y: y + 0.026, "font-size": 0.075, "text-anchor": "middle", fill: "#fff" }, this.goals, text);

@@ -123,7 +123,7 @@ export function showLegend(score) {
   scale.append(`${t(`legend.${score}.low`)} `);
   made("span", undefined, scale, { class: "scale" });
   scale.append(t(`legend.${score}.high`));
-  for (const name of [IN_SOME_FILES.includes(score) ? "unknown" : "zero", "blocked", "person", "furniture", "goal"]) {
+  for (const name of [IN_SOME_FILES.includes(score) ? "unknown" : "zero", "blocked", "outside", "person", "furniture", "goal"]) {
     const item = made("li", undefined, list);
     made("span", undefined, item, { class: name });
     item.append(t(`legend.${name}`));

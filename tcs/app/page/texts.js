@@ -28,7 +28,7 @@ export function goalName(goal) {
 // model before it, it is of the robot, or a thing of the scene, as `isThing` says of its name.
 export function bodyName(body, isThing) {
   const [name, model = "robot"] = body.split("::").reverse();
-  if (name === body && isThing(name.replace(/_[bc]$/, ""))) return modelName(name.replace(/_[bc]$/, ""));
+  if (name === body && isThing(name.replace(/_[b-e]$/, ""))) return modelName(name.replace(/_[b-e]$/, ""));
   const sides = { l: "left", left: "left", r: "right", right: "right" };
   const words = name.replace(/_link$/, "").split(/[_ ]/).map((word) => sides[word] ?? word);
   const isSide = (word) => word === "left" || word === "right";

@@ -1,6 +1,6 @@
 // The scene in space: robot, person, furniture and the coloured floor by WebGL, numbered goals on top of everything.
 
-import { MARKS, grouped } from "./marks.js";
+import { MARKS, grouped, whole } from "./marks.js";
 import { cornersOf } from "./solids.js";
 
 const COLOURS = {
@@ -240,8 +240,9 @@ export class View3d {
       const at = this.#seen(camera, goal.slice(0, 3));
       return at && { at, number, reached: Boolean(this.outcomes[number]?.reached) };
     });
-    for (const { at, text, reached, count } of grouped(seen.filter(Boolean), 1.6 * size)) {
-      const half = size * count;
+    for (const { at: middle, text, reached, wide } of grouped(seen.filter(Boolean), 1.6 * size)) {
+      const half = size * wide;
+      const at = [whole(middle[0], half, 0, marks.width), whole(middle[1], size, 0, marks.height)];
       context.fillStyle = reached ? MARKS.reached : MARKS.unreached;
       context.beginPath();
       context.roundRect(at[0] - half, at[1] - size, 2 * half, 2 * size, reached ? size : 0);

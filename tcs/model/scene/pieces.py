@@ -13,10 +13,13 @@ from tcs.model.scene.environment.environment_file import EnvironmentFile, Obstac
 Size = tuple[float, float, float]
 
 PIECES: dict[str, tuple[tuple[Size, Size], ...]] = {
-    # Size along x, y, z and centre [m]; x points where the piece faces. The space below a seat or a
-    # table top is closed: a base must not count on the legs being elsewhere.
+    # Size along x, y, z and centre [m]; x points where the piece faces. The space below a seat is
+    # closed: a base must not count on the legs being elsewhere. Below a table are knees.
     "chair": (((0.45, 0.45, 0.46), (0.0, 0.0, 0.23)), ((0.05, 0.45, 0.44), (-0.2, 0.0, 0.68))),
-    "table": (((0.8, 1.2, 0.74), (0.0, 0.0, 0.37)),),
+    "table": (
+        ((0.8, 1.2, 0.04), (0.0, 0.0, 0.72)),
+        *(((0.06, 0.06, 0.7), (x, y, 0.35)) for x in (0.37, -0.37) for y in (0.57, -0.57)),
+    ),
     "cabinet": (((0.45, 0.45, 0.6), (0.0, 0.0, 0.3)),),
     "wall": (((0.1, 2.0, 2.5), (0.0, 0.0, 1.25)),),
     # A clear width of 0.9 m, as for wheelchairs.
@@ -59,7 +62,7 @@ def with_pieces(environment: EnvironmentFile, pieces: Iterable[PlacedPiece]) -> 
         names = (f"{placed.piece}_{i}" for i in itertools.count(1))
         name = next(name for name in names if name not in taken)
         cos, sin = math.cos(placed.yaw), math.sin(placed.yaw)
-        for letter, (size, (x, y, z)) in zip("abc", PIECES[placed.piece], strict=False):
+        for letter, (size, (x, y, z)) in zip("abcde", PIECES[placed.piece], strict=False):
             whole = name if letter == "a" else f"{name}_{letter}"
             taken.add(whole)
             added.append(

@@ -96,3 +96,17 @@ def test_pieces_are_boxes_with_names_of_their_own():
 def test_pieces_stand_on_the_floor(piece):
     lows = [centre[2] - size[2] / 2 for size, centre in PIECES[piece]]
     assert min(lows) == pytest.approx(0.0)
+
+
+def test_below_a_table_are_knees():
+    legs = [(size, at) for size, at in PIECES["table"] if at[2] - size[2] / 2 == 0.0]
+    assert len(legs) == 4
+    for size, at in legs:
+        # At the corners, within the outline of the top, and up to it.
+        assert abs(at[0]) + size[0] / 2 == pytest.approx(0.4)
+        assert abs(at[1]) + size[1] / 2 == pytest.approx(0.6)
+        assert size[2] == pytest.approx(0.7)
+    (top,) = [one for one in PIECES["table"] if one not in legs]
+    assert top[1][2] - top[0][2] / 2 == pytest.approx(0.7)
+    placed = with_pieces(load_environment("wheelchair"), [PlacedPiece(piece="table", x=1.0, y=0.0)])
+    assert len({one.name for one in placed.obstacles}) == 5
