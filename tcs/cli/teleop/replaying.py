@@ -43,15 +43,19 @@ def replay(
         return
 
     from tcs.output.view import open_meshcat
+    from tcs.output.view.scene_page import ScenePage
     from tcs.output.view.teleop import Replay, RobotDisplay
     from tcs.output.view.teleop.replay import load_run_view
 
     view = load_run_view(run, robot)
-    meshcat = open_meshcat(window.port)
+    meshcat = open_meshcat(hidden=True)
+    scene = ScenePage(meshcat, window.port)
     playback = Replay(meshcat, RobotDisplay(view.arm, meshes=True), view)
     typer.echo(f"{view.arm.robot.title}: {view.summary}")
-    open_page(meshcat.web_url(), window.browser)
+    open_page(scene.url, window.browser)
     try:
         playback.run(window.duration)
     except KeyboardInterrupt:
         terminal.note("closed.")
+    finally:
+        scene.close()

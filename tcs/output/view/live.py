@@ -17,6 +17,7 @@ from tcs.errors import OutputError
 from tcs.output.view.controls import KEYS, Controls, ViewState
 from tcs.output.view.floor import floor_map
 from tcs.output.view.scene_objects import SceneObjects, Snapshot, arrow_path, draw_floor
+from tcs.output.view.scene_page import ScenePage
 from tcs.output.view.viewed_set import ViewedSet
 from tcs.placement.tables import Reason
 
@@ -73,7 +74,7 @@ def _delete_unused() -> None:
 
 
 def stay_open(
-    meshcat: Meshcat,
+    page: ScenePage,
     run: Callable[[], None],
     *,
     browser: bool,
@@ -82,19 +83,21 @@ def stay_open(
     """Tell the address of a viewer, open a browser if wanted, and run it until it ends or Ctrl-C.
 
     Args:
-        meshcat: The viewer.
+        page: The page of the viewer.
         run: Runs it.
         browser: Whether to open a browser.
         on_note: Called with the address, and with a note when Ctrl-C closes the viewer.
     """
     begun = time.perf_counter()
-    on_note(f"open {meshcat.web_url()} in a browser; Ctrl-C ends.")
+    on_note(f"open {page.url} in a browser; Ctrl-C ends.")
     if browser:
-        webbrowser.open(meshcat.web_url())
+        webbrowser.open(page.url)
     try:
         run()
     except KeyboardInterrupt:
         on_note(f"closed after {time.perf_counter() - begun:.0f} s.")
+    finally:
+        page.close()
 
 
 def wait(duration: float | None) -> None:

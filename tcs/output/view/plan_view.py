@@ -21,6 +21,7 @@ from tcs.output.view.animation import play_poses, play_visible
 from tcs.output.view.export import overlay, static_page, swatch
 from tcs.output.view.live import open_meshcat, stay_open, wait
 from tcs.output.view.scene_objects import SceneShapes, arrow_path
+from tcs.output.view.scene_page import ScenePage
 from tcs.output.view.swept import swept_mesh
 from tcs.output.words import REASON_COLOURS, base_pose_text, goals_text
 from tcs.output.words.motions import not_done_text
@@ -189,7 +190,7 @@ def show_plan_view(
 
     Args:
         view: The view.
-        port: Port of the viewer; by default the first free one from 7000 on.
+        port: Port of the viewer; by default 7000, or a free one.
         browser: Whether to open a browser.
         duration: Time until the viewer closes [s]; None until Ctrl-C.
         on_line: Called with each line about what is shown.
@@ -198,11 +199,12 @@ def show_plan_view(
     Raises:
         OutputError: If the viewer cannot listen at that port.
     """
-    meshcat = open_meshcat(port)
+    meshcat = open_meshcat(hidden=True)
+    page = ScenePage(meshcat, port)
     show_plan(view, meshcat)
     for line in (view.title, *view.lines):
         on_line(line)
-    stay_open(meshcat, lambda: wait(duration), browser=browser, on_note=on_note)
+    stay_open(page, lambda: wait(duration), browser=browser, on_note=on_note)
 
 
 def _goals_at(stop: StopPlan, times: FloatArray) -> list[int]:

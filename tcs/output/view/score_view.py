@@ -15,6 +15,7 @@ from tcs.output.report.score.shown_set import ShownSet
 from tcs.output.view.export import export_page
 from tcs.output.view.live import Viewer, open_meshcat, stay_open
 from tcs.output.view.scene_objects import SceneObjects
+from tcs.output.view.scene_page import ScenePage
 from tcs.output.view.viewed_set import ViewedSet
 from tcs.output.words import colour_legend
 from tcs.placement.store import ScoreFile
@@ -113,7 +114,7 @@ def show_score_view(
 
     Args:
         view: The view.
-        port: Port of the viewer; by default the first free one from 7000 on.
+        port: Port of the viewer; by default 7000, or a free one.
         browser: Whether to open a browser.
         duration: Time until the viewer closes [s]; None until Ctrl-C.
         on_line: Called with each line about what is shown.
@@ -122,8 +123,9 @@ def show_score_view(
     Raises:
         OutputError: If the viewer cannot listen at that port.
     """
-    meshcat = open_meshcat(port)
+    meshcat = open_meshcat(hidden=True)
+    page = ScenePage(meshcat, port)
     on_line(f"{view.title}; {view.subtitle}")
     on_line(f"arrows: {colour_legend()}")
     viewer = Viewer(meshcat, view.objects, view.viewed, on_line)
-    stay_open(meshcat, lambda: viewer.run(duration), browser=browser, on_note=on_note)
+    stay_open(page, lambda: viewer.run(duration), browser=browser, on_note=on_note)

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
-from urllib.parse import urlsplit
 
 import numpy as np
 
@@ -32,8 +31,6 @@ from tcs.teleop.experiment.trial import GOAL_RADIUS, NO_LATENCY
 from tcs.teleop.runs.recorder import Recorder
 from tcs.teleop.runs.run import Run
 
-_PAGE_PORT = 7100
-"""Port of the operator's page, where none is given and this one is free."""
 LiveCondition = Literal["end-effector", "novel", "assisted", "drake", "joint"]
 CONDITION_MODES: Mapping[LiveCondition, tuple[Mode, ...]] = {
     "end-effector": (Mode.END_EFFECTOR,),
@@ -154,17 +151,13 @@ class LiveSession:
         options = self._options
         desk = desk_of(self.arm, settings.groups, self.link.sliders)
         page = operator_html(desk, cameras=options.cameras, xr=options.xr)
-        scene = urlsplit(self._meshcat.web_url())
-        address = str(scene.hostname), self._meshcat.port()
         self.cameras = Cameras(self.arm, start) if options.cameras else None
         pictures = dict if self.cameras is None else self.cameras.pictures
         try:
-            self._server = OperatorPage(page, pictures, self.link, address, port or _PAGE_PORT)
+            self._server = OperatorPage(page, pictures, self.link, self._meshcat, port)
         except OutputError:
-            if port is not None:
-                self.close_cameras()
-                raise
-            self._server = OperatorPage(page, pictures, self.link, address)
+            self.close_cameras()
+            raise
         self.url = self._server.url
 
     def _show_cameras(self, joints: FloatArray) -> None:

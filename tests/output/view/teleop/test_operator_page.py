@@ -5,12 +5,16 @@ from __future__ import annotations
 import json
 import re
 import socket
+import sys
 import urllib.request
 from http.client import HTTPConnection
+from urllib.parse import urlsplit
 
 import pytest
 
 from tcs.errors import OutputError
+from tcs.output.view import open_meshcat
+from tcs.output.view.scene_page import ScenePage
 from tcs.output.view.teleop import operator_page
 from tcs.output.view.teleop.controls import buttons, sliders
 from tcs.output.view.teleop.operator_page import OperatorPage, desk_of, operator_html
@@ -25,8 +29,7 @@ def pictures():
 
 @pytest.fixture
 def served(pictures, link, meshcat):
-    scene = ("localhost", meshcat.port())
-    found = OperatorPage("<html>driving</html>", lambda: pictures, link, scene)
+    found = OperatorPage("<html>driving</html>", lambda: pictures, link, meshcat)
     yield found
     found.close()
 
@@ -57,13 +60,13 @@ def test_nothing_else_is_served(served, pictures, path):
     assert got(served, path)[0] == 404
 
 
-def test_an_occupied_port_is_refused():
+def test_an_occupied_port_is_refused(meshcat):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
         with pytest.raises(OutputError, match=f"port {port}"):
-            OperatorPage("", dict, PageLink({}, {}), ("localhost", 1), port)
+            OperatorPage("", dict, PageLink({}, {}), meshcat, port)
 
 
 def test_keys_arrive_and_the_readout_returns(served, link):
@@ -121,7 +124,7 @@ def test_the_page_is_that_of_meshcat_and_loads_nothing_from_elsewhere(served):
 
 
 def test_a_page_of_another_form_is_refused(monkeypatch):
-    monkeypatch.setattr(operator_page, "_part_of_meshcat", lambda name: b"<html></html>")
+    monkeypatch.setattr(operator_page, "part_of_meshcat", lambda name: b"<html></html>")
     with pytest.raises(OutputError, match="cannot be extended"):
         operator_html({}, cameras=True, xr=True)
 
@@ -150,6 +153,28 @@ def test_the_scene_is_open_to_its_own_page_only(served, meshcat):
     with socket_:
         assert reply.startswith(b"HTTP/1.1 101 ")
         assert meshcat.GetNumActiveConnections() == 1
+
+
+def test_a_viewer_is_open_to_its_own_page_only(meshcat):
+    viewer = ScenePage(meshcat)
+    try:
+        assert got(viewer, "/", **{"Sec-Fetch-Site": "cross-site"})[0] == 403
+        assert b"Drake MeshCat" in got(viewer, "/")[2]
+        for origin, status in (("http://evil.example", b"403"), (viewer.url.strip("/"), b"101")):
+            socket_, reply = opened(viewer, origin)
+            with socket_:
+                assert reply.startswith(b"HTTP/1.1 " + status)
+    finally:
+        viewer.close()
+
+
+def test_a_hidden_meshcat_is_not_where_a_page_would_look():
+    first, second = (urlsplit(open_meshcat(hidden=True).web_url()) for _ in range(2))
+    assert first.port not in range(7000, 8000)
+    if sys.platform == "linux":
+        assert first.hostname != second.hostname
+        with pytest.raises(ConnectionRefusedError):
+            socket.create_connection(("127.0.0.1", first.port), timeout=5)
 
 
 def test_the_page_can_be_in_no_frame(served):
