@@ -18,6 +18,12 @@ HOLD = 0.4
 """Time for which the page runs after a key [s]: the arm moves and comes to rest."""
 
 
+@pytest.fixture(autouse=True)
+def patient(monkeypatch):
+    """A page that draws by software on a busy machine stands still for a second at a time."""
+    monkeypatch.setattr("tcs.output.view.teleop.page_link.SILENCE", 1.8)
+
+
 @pytest.fixture(scope="module")
 def browser():
     yield from chromium()

@@ -30,6 +30,12 @@ return [...document.querySelectorAll("#desk button")].map(one => one.getBounding
 """
 
 
+@pytest.fixture(autouse=True)
+def patient(monkeypatch):
+    """A page that draws by software on a busy machine stands still for a second at a time."""
+    monkeypatch.setattr("tcs.output.view.teleop.page_link.SILENCE", 1.8)
+
+
 @pytest.fixture(scope="module")
 def browser():
     yield from chromium()
