@@ -209,8 +209,9 @@ def test_modes_are_switched_and_bars_say_their_state(page, browser):
         key(browser, "KeyM", True)
         key(browser, "KeyM", False)
         page.page.run(0.2)
+    # A key that goes down while the mode changes has no effect.
+    until(page, lambda: "end-effector" in browser.driver.execute_script(mode))
     key(browser, "KeyF", True)
-    # On a machine that is slow to draw, the arm pauses between messages.
     until(page, lambda: page.page.last.limits.any(), patience=120.0)
     page.page.run(0.5)
     limited = np.flatnonzero(page.page.last.limits)
