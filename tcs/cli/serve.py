@@ -72,8 +72,36 @@ class _FrameOptions:
         return FrameNames(environment=self.environment_frame, base=self.base_frame, person=person)
 
 
+_OF_MODES = {
+    ("HTTP",): ("host", "port", "token"),
+    ("--ros2",): ("router",),
+    ("--ros1", "--ros2"): ("environment_frame", "base_frame", "person_frame", "max_age"),
+    ("HTTP", "--ros1", "--ros2"): ("prepare",),
+}
+"""Options by the modes that they are for."""
+
+
+def _check_options(context: typer.Context, mode: str) -> None:
+    """Refuse options of other modes than the one that is served.
+
+    Raises:
+        typer.BadParameter: If one is given on the command line.
+    """
+    for modes, names in _OF_MODES.items():
+        for name in names:
+            source = context.get_parameter_source(name)
+            given = source is not None and source.name == "COMMANDLINE"
+            if given and mode not in modes:
+                option = f"--{name.replace('_', '-')}"
+                raise typer.BadParameter(
+                    f"is for {' and '.join(modes)}, not for {mode}. Leave it out.",
+                    param_hint=option,
+                )
+
+
 @expand_options
 def serve(
+    context: typer.Context,
     files: Files = None,
     host: Annotated[
         str,
@@ -128,6 +156,8 @@ def serve(
     """Serve the engine over HTTP: score, select, explain, evaluate and plan as requests."""
     if assistant + ros1 + ros2 > 1:
         raise typer.BadParameter("give one of them.", param_hint="--mcp, --ros1, --ros2")
+    mode = "--mcp" if assistant else "--ros1" if ros1 else "--ros2" if ros2 else "HTTP"
+    _check_options(context, mode)
     if assistant:
         _serve_assistant(files, jobs)
         return

@@ -216,4 +216,4 @@ def ascending_from(steps: NDArray[Any], end: int, what: str) -> NDArray[np.int64
     # Summed in floating point first: integer overflow must not make forged steps valid.
     if steps.sum(dtype=np.float64) >= float(end):
         raise StoreFormatError(f"has {what} that do not exist")
-    return np.cumsum(steps.astype(np.int64))
+    return np.cumsum(steps, dtype=np.int64)

@@ -141,7 +141,13 @@ def read_mapping(
         DataFileError: As `error`, if the file cannot be read, is not YAML, contains a key twice, or
             is not a mapping.
     """
-    text = read_text(path, where, error, limit=MAX_BYTES)
+    return mapping_of(read_text(path, where, error, limit=MAX_BYTES), where, error, known=known)
+
+
+def mapping_of(
+    text: str, where: str, error: type[DataFileError], *, known: Iterable[str]
+) -> dict[str, Any]:
+    """Return the keys and values of a text in YAML; as `read_mapping`."""
     try:
         content = yaml.load(text, _Loader)
     except yaml.YAMLError as reason:

@@ -41,9 +41,11 @@ class _Copier:
 
     def copy(self, what: str, value: object, depth: int) -> Any:
         self._items += 1
+        # A long key would be copied into the name of each of its values.
+        what = what[:80]
         if depth > MAX_DEPTH or self._items > MAX_ITEMS:
             raise StoreError(
-                f"{what[:80]}: more than {MAX_DEPTH} levels or {MAX_ITEMS} values; a file of tcs "
+                f"{what}: more than {MAX_DEPTH} levels or {MAX_ITEMS} values; a file of tcs "
                 "has far fewer."
             )
         if isinstance(value, np.generic):
@@ -56,14 +58,15 @@ class _Copier:
                 return scalar(value)
         if isinstance(value, Mapping):
             if not all(isinstance(key, str) for key in value):
-                raise StoreError(f"{what[:80]}: keys must be text.")
+                raise StoreError(f"{what}: keys must be text.")
             return {
-                str(key): self.copy(f"{what}.{key}", item, depth + 1) for key, item in value.items()
+                str(key): self.copy(f"{what}.{key[:80]}", item, depth + 1)
+                for key, item in value.items()
             }
         if isinstance(value, list | tuple):
             items = (self.copy(f"{what}[{i}]", item, depth + 1) for i, item in enumerate(value))
             return list(items) if isinstance(value, list) else tuple(items)
         raise StoreError(
-            f"{what[:80]} is {type(value).__name__}, but a file may contain plain types only: "
+            f"{what} is {type(value).__name__}, but a file may contain plain types only: "
             "dict, list, tuple, str, int, float, bool, None."
         )

@@ -27,12 +27,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import StoreError, StoreFormatError, TcsError, UnsafeStoreError
-from tcs.files.compression import FREE_BYTES, MAX_RATIO
+from tcs.files.compression import FREE_BYTES
 from tcs.files.reading import read_bytes
 
 MAX_BYTES = 2 * 1024**3
 """Greatest size after decompression [bytes]: several times that of the largest score file, and less
 than the memory of a common machine."""
+
+WRAPPED_RATIO = 20
+"""Most bytes that a byte of a compressed file may decompress to on average, beyond FREE_BYTES: the
+arrays in it are compressed already."""
+
+FREE_OPERATIONS = 1_000_000
+"""Operations of the pickle language that any file may have: the files of `tcs` have some thousand.
+Each makes an object of about a hundred bytes."""
+BYTES_PER_OPERATION = 50
+"""Bytes of a decompressed file for each further operation, so that its objects take at most twice
+the memory of its bytes."""
 
 ELEMENT_TYPES = ("u1", "u2", "u4", "u8", "i4", "i8", "f4", "f8")
 """Element types of arrays: plain numbers. Arrays of objects ("O") contain further pickles."""
@@ -53,7 +64,7 @@ _PLAIN_OPERATIONS = (
     *(pickle.SHORT_BINUNICODE, pickle.BINUNICODE),
     *(pickle.EMPTY_TUPLE, pickle.TUPLE1, pickle.TUPLE2, pickle.TUPLE3, pickle.TUPLE),
     *(pickle.EMPTY_LIST, pickle.APPEND, pickle.APPENDS),
-    *(pickle.EMPTY_DICT, pickle.SETITEM, pickle.SETITEMS),
+    *(pickle.EMPTY_DICT,),
     *(pickle.MEMOIZE, pickle.BINPUT, pickle.LONG_BINPUT, pickle.BINGET, pickle.LONG_BINGET),
     # These refer to a global by name and call `find_class` below.
     *(pickle.GLOBAL, pickle.STACK_GLOBAL, pickle.INST),
@@ -97,12 +108,34 @@ class _ArrayToCome:
     """Placeholder on the stack between the name of the array wrapper and its state."""
 
 
+def _counted(operation: Callable[[Any], None]) -> Callable[[Any], None]:
+    """Return an operation of the reader that is counted first."""
+
+    def counted(self: _Reader) -> None:
+        self.counted()
+        operation(self)
+
+    return counted
+
+
+def _check_keys(keys: list[Any]) -> None:
+    """Refuse keys of a dict that are not text.
+
+    Raises:
+        StoreFormatError: If there is one.
+    """
+    for key in keys:
+        if type(key) is not str:
+            raise StoreFormatError(f"has the key {_shown(key)}; keys must be text")
+
+
 class _Reader(pickle._Unpickler):
     """The restricted reader of one file's bytes."""
 
     def __init__(self, data: bytes) -> None:
         self._file = io.BytesIO(data)
         self._data = data
+        self._left = FREE_OPERATIONS + len(data) // BYTES_PER_OPERATION
         self.stack: list[Any] = []
         super().__init__(self._file)
 
@@ -126,6 +159,33 @@ class _Reader(pickle._Unpickler):
                 f"refers to {_shown(f'{module}.{name}')}, which is not on the allow-list "
                 "(numpy arrays and plain containers)"
             ) from None
+
+    def counted(self) -> None:
+        """Count an operation, before it makes anything.
+
+        Raises:
+            StoreFormatError: If the file has too many.
+        """
+        self._left -= 1
+        if self._left < 0:
+            raise StoreFormatError(
+                "has far more values than a file of tcs; it may be meant to fill the memory"
+            )
+
+    def load_setitem(self) -> None:
+        """Add an entry to a dict; its key must be text, as keys of other types may collide."""
+        _check_keys([self.stack[-2]])
+        self._plain(pickle.SETITEM)
+
+    def load_setitems(self) -> None:
+        """Add entries to a dict; as `load_setitem`."""
+        # The entries are on the stack of their own that began with a mark.
+        _check_keys(self.stack[::2])
+        self._plain(pickle.SETITEMS)
+
+    def _plain(self, operation: bytes) -> None:
+        plain: Any = pickle._Unpickler.dispatch[operation[0]]
+        plain(self)
 
     def load_reduce(self) -> None:
         """Build an element type, where pickle would call any function."""
@@ -191,11 +251,13 @@ class _Reader(pickle._Unpickler):
         return array.astype(element.dtype.newbyteorder("="), copy=False)
 
     dispatch: ClassVar[dict[int, Any]] = {
-        **{op[0]: pickle._Unpickler.dispatch[op[0]] for op in _PLAIN_OPERATIONS},
+        **{op[0]: _counted(pickle._Unpickler.dispatch[op[0]]) for op in _PLAIN_OPERATIONS},
+        pickle.SETITEM[0]: _counted(load_setitem),
+        pickle.SETITEMS[0]: _counted(load_setitems),
         **dict.fromkeys((op[0] for op in _REFUSED_OPERATIONS), refuse),
-        pickle.REDUCE[0]: load_reduce,
-        pickle.NEWOBJ[0]: load_newobj,
-        pickle.BUILD[0]: load_build,
+        pickle.REDUCE[0]: _counted(load_reduce),
+        pickle.NEWOBJ[0]: _counted(load_newobj),
+        pickle.BUILD[0]: _counted(load_build),
     }
     """Methods by operation; an operation that is not listed raises an error."""
 
@@ -267,7 +329,7 @@ def _decompress(name: str, data: bytes, again: str) -> bytes:
             f"{name} is {'empty' if not data else 'not a joblib file of tcs'}. {again}"
         )
     # tcs wraps its files without compressing them; joblib's own compression stays far below this.
-    most = min(MAX_BYTES, FREE_BYTES + MAX_RATIO * len(data))
+    most = min(MAX_BYTES, FREE_BYTES + WRAPPED_RATIO * len(data))
     decompressor = zlib.decompressobj()
     try:
         content = decompressor.decompress(data, most + 1)

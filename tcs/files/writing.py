@@ -78,7 +78,7 @@ def scratch_folder() -> Iterator[Path]:
     remove_leftovers(above)
     folder = above / f"tcs-{_token()}"
     try:
-        make_folder(folder, "temporary folder", advice="Set TMPDIR to a folder you may write to.")
+        make_private_folder(folder)
         handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
         try:
             _lock(handle, fcntl.LOCK_EX)
@@ -87,6 +87,17 @@ def scratch_folder() -> Iterator[Path]:
             os.close(handle)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def make_private_folder(folder: Path) -> None:
+    """Create a folder for temporary files that no other user can look into, if there is none.
+
+    Raises:
+        OutputError: If it cannot be created.
+    """
+    make_folder(
+        folder, "temporary folder", advice="Set TMPDIR to a folder you may write to.", mode=0o700
+    )
 
 
 @cache
@@ -168,7 +179,11 @@ def _check_target(path: Path, what: str, advice: str) -> None:
 
 
 def make_folder(
-    folder: Path, what: str = "folder", *, advice: str = "Name a folder that can be created."
+    folder: Path,
+    what: str = "folder",
+    *,
+    advice: str = "Name a folder that can be created.",
+    mode: int = 0o777,
 ) -> None:
     """Create a folder and its parents where they do not exist.
 
@@ -176,12 +191,13 @@ def make_folder(
         folder: The folder.
         what: Name of the folder in messages.
         advice: Advice to the user if the folder cannot be created.
+        mode: Permissions of the folder, less those of the umask.
 
     Raises:
         OutputError: If the folder cannot be created.
     """
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(mode, parents=True, exist_ok=True)
     except (OSError, ValueError) as error:
         raise OutputError(
             f"{what} '{folder}' cannot be created: {path_fault(error)}. {advice}"

@@ -11,6 +11,7 @@ from tcs.model.grid import Axis, InitialConfiguration
 from tcs.placement.constraints import Constraints, Obstacle, Region
 from tcs.placement.selection import TravelWeights, UtilityWeights, nearest_table
 from tcs.placement.store import ScoreFile
+from tcs.service.limits import MOST_VERTICES
 from tcs.service.requests import (
     BasePose,
     ForbiddenRegion,
@@ -131,8 +132,14 @@ def regions_of(given: Sequence[ForbiddenRegion]) -> tuple[Region, ...]:
     """Return the forbidden regions of a request.
 
     Raises:
-        SelectionError: If one is not of its form.
+        SelectionError: If one is not of its form, or they have too many vertices together.
     """
+    vertices = sum(one.count(",") + 1 if isinstance(one, str) else len(one) for one in given)
+    if vertices > MOST_VERTICES:
+        raise SelectionError(
+            f"'forbid': the regions have {vertices:,} vertices; at most {MOST_VERTICES:,} are "
+            "accepted. Simplify their outlines."
+        )
     return tuple(
         Region.parse(one)
         if isinstance(one, str)

@@ -8,25 +8,18 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
-from tcs.errors import EnvironmentFileError, ServiceError, TcsError, UnknownNameError
-from tcs.files.documents import checked
+from tcs.errors import EnvironmentFileError, ServiceError, TcsError
+from tcs.files.documents import Document, checked
 from tcs.files.json_values import without_infinities
 from tcs.files.writing import scratch_folder
 from tcs.kernel.dexterity import dexterity
 from tcs.model.catalogue import catalogue, check_names
-from tcs.output.words import choice_in_words, explanation_in_words, goal_index
-from tcs.placement.constraints import scored_entries
-from tcs.placement.reasons import explain, fix_weights
-from tcs.placement.selection import Executability, Top, select
+from tcs.output.words import goal_index
+from tcs.service.answers import Answers, answer_in_process
 from tcs.service.conversions import (
-    constraints_of,
-    observed_of,
     state_of,
-    table_of,
-    travel_of,
-    utility_of,
 )
-from tcs.service.floor import floor_of, outcome_of
+from tcs.service.described import DescribedScenes, work_by_name
 from tcs.service.heavy_imports import drawing_steps, import_heavy, import_scoring
 from tcs.service.jobs import Jobs, Progress
 from tcs.service.limits import Limits
@@ -51,12 +44,28 @@ from tcs.service.requests import (
 )
 from tcs.service.responses import FileEntry, JobStatus
 from tcs.service.score_files import ScoreFiles
+from tcs.service.sent_content import request_of
 from tcs.service.sent_documents import SentDocuments
 from tcs.service.set_work import SetWork
 from tcs.service.views import Views
 from tcs.service.work import SceneWork
+from tcs.service.worker import WorkerPool
 
 _DEFAULT_LIMITS = Limits()
+_PARSING = ("tcs.service.answers", "tcs.service.sent_content", "tcs.service.requests")
+"""What the processes import that read what clients send."""
+_NAMES: dict[type[Any], str] = {
+    ScoreRequest: "score",
+    ScoreHereRequest: "score-here",
+    EvaluateRequest: "evaluate",
+    PlanRequest: "plan",
+    SceneRequest: "scene",
+    PopulationRequest: "population",
+    RefineRequest: "refine",
+    MotionsRequest: "motions",
+    RescoreRequest: "rescore",
+}
+"""Names of jobs, as in `work_by_name`, by their requests."""
 _POLL = 60.0
 """Interval at which a waiting caller is woken without need [s]."""
 
@@ -77,13 +86,18 @@ class Engine:
         self._limits = limits
         self._stack = ExitStack()
         folder = self._stack.enter_context(scratch_folder())
-        self._files = ScoreFiles(folder, limits)
-        self._sent = SentDocuments(folder)
+        self._parsing = WorkerPool(limits.parsing, memory=limits.parse_bytes, imports=_PARSING)
+        self._stack.callback(self._parsing.close)
+        self._files = ScoreFiles(folder, limits, self._parsing)
+        self._answers = Answers(self._files)
+        self._sent = SentDocuments(folder, limits.document_bytes)
         self._jobs = Jobs(limits)
         self._views = Views(self._files)
         self._postures = ScenePostures()
         self._work = SceneWork(self._files, self._sent, limits)
-        self._set_work = SetWork(self._files, limits)
+        self._jobs_by_name = work_by_name(self._work, SetWork(self._files, limits))
+        self._described = DescribedScenes(self._files, folder, limits)
+        self._stack.callback(self._described.close)
         self._preparation: Preparation | None = None
 
     def __enter__(self) -> Self:
@@ -112,9 +126,26 @@ class Engine:
             on_end: Called by the thread when it is done, or a step has failed.
         """
         if self._preparation is None:
-            steps = (import_scoring, self._work.prepare, *drawing_steps())
+            steps = (
+                self._parsing.start, import_scoring, self._work.prepare, *drawing_steps()
+            )  # fmt: skip
             self._preparation = Preparation(steps, on_end)
         return self._preparation
+
+    def request_of(self, model: type[Document], content: bytes) -> Any:
+        """Return a checked request, read in a process of its own.
+
+        Args:
+            model: Model of its fields.
+            content: A JSON object.
+
+        Raises:
+            TcsError: If it is not one, or a field is not of its form.
+            ServiceError: If reading it meets a limit.
+        """
+        return self._parsing.call(
+            request_of, model, content, seconds=self._limits.parse_seconds, what="the request"
+        )
 
     @property
     def limits(self) -> Limits:
@@ -201,34 +232,7 @@ class Engine:
             ServiceError: If torso or settings are given without the base pose.
             TcsError: As `tcs.select`.
         """
-        with self._files.held(request.file).lock:
-            file = self._files.loaded(request.file)
-            motions = self._files.motions(request.file) if request.executable else None
-            if request.here is None and (request.torso or request.at):
-                raise ServiceError("'torso' and 'at' require 'here'.")
-            here = None
-            if request.here is not None:
-                here = state_of(request.here, request.torso, request.at)
-            choose = partial(
-                select,
-                file,
-                here,
-                weights=utility_of(request),
-                travel=travel_of(request),
-                constraints=constraints_of(request, request.prefer),
-                top=None
-                if request.top is None
-                else Top(count=request.top, min_apart=request.min_apart),
-                max_members=request.max_members,
-                observed=observed_of(request.observed, file.observed_axes),
-                frames=request.frames,
-            )
-            choice = choose(motions=motions)
-            result = {**choice_in_words(file, choice, here), **scored_entries(file)}
-            if motions is not None:
-                compared = Executability.of(file, motions, choice, choose())
-                result["executable"] = compared.to_json(choice)
-        return dict(without_infinities(result))
+        return self._answers.select(request)
 
     def explain(self, request: ExplainRequest) -> dict[str, Any]:
         """Return why a goal is not reached and the cheapest change, as `tcs explain --json`.
@@ -238,31 +242,7 @@ class Engine:
             ServiceError: If both a configuration and a state are given.
             TcsError: As `tcs.explain`.
         """
-        if request.configuration is not None and request.here is not None:
-            raise ServiceError("give 'configuration' or 'here', not both.")
-        if request.here is None and (request.at or request.torso or request.arm):
-            raise ServiceError("'torso', 'at' and 'arm' require 'here'.")
-        with self._files.held(request.file).lock:
-            file = self._files.loaded(request.file)
-            explanation = explain(
-                file,
-                goal_index(file, request.goal),
-                request.configuration
-                if request.here is None
-                else state_of(request.here, request.torso, request.at, request.arm),
-                weights=fix_weights(
-                    file.configurations,
-                    metre=request.metre_weight,
-                    turn=request.turn_weight,
-                    torso=request.torso_weight,
-                    environment=tuple(request.axis_weight.items()),
-                    route=request.travel,
-                ),
-                observed=observed_of(request.observed, file.observed_axes),
-                frames=request.frames,
-            )
-            result = explanation_in_words(file, explanation)
-        return dict(without_infinities(result))
+        return self._answers.explain(request)
 
     def floor(self, request: FloorRequest) -> dict[str, Any]:
         """Return the best scores at each base position, as `tcs.service.floor.floor_of`.
@@ -271,10 +251,7 @@ class Engine:
             NotFoundError: If the score file is not held.
             GridError: If there is no such state of the environment.
         """
-        with self._files.held(request.file).lock:
-            file = self._files.loaded(request.file)
-            motions = self._files.known_motions(request.file)
-            return floor_of(file, table_of(file, request), request.state, motions)
+        return self._answers.floor(request)
 
     def outcome(self, request: OutcomeRequest) -> dict[str, Any]:
         """Return what is reached from a base pose, as `tcs.service.floor.outcome_of`.
@@ -283,10 +260,28 @@ class Engine:
             NotFoundError: If the score file is not held.
             SelectionError: If the base pose is beyond the grid, or an axis is missing.
         """
-        with self._files.held(request.file).lock:
-            file = self._files.loaded(request.file)
-            stated = state_of(request.here, request.torso, request.at)
-            return outcome_of(file, table_of(file, request), stated, best=request.best)
+        return self._answers.outcome(request)
+
+    def answer_apart(self, name: str, request: Any) -> dict[str, Any]:
+        """Return what the method of a name does, from a process of its own.
+
+        Large requests take longer: those of others about the same file need not wait for them.
+
+        Args:
+            name: "select", "explain", "floor" or "outcome".
+            request: The request.
+
+        Raises:
+            ServiceError: If the answer meets a limit.
+            TcsError: As the method.
+        """
+        held = self._files.held(request.file)
+        motions = self._files.known_motions(request.file)
+        answer: dict[str, Any] = self._parsing.call(
+            answer_in_process, name, request, held, motions,
+            seconds=self._limits.parse_seconds, what="the request",
+        )  # fmt: skip
+        return answer
 
     def posture(self, request: PostureRequest) -> dict[str, Any]:
         """Return the scene in space at a base pose, as `tcs.service.postures.ScenePostures.at`.
@@ -296,6 +291,8 @@ class Engine:
             StoreMismatchError: If the models are not those the file was made from.
             SelectionError: If the base pose is beyond the grid, or there is no such goal.
         """
+        if self._files.held(request.file).is_described:
+            return self._described.do("posture", request)
         file = self._files.for_scene(request.file)
         stated = state_of(request.here, request.torso, request.at)
         import_heavy()
@@ -360,38 +357,24 @@ class Engine:
 
     def _work_of(self, request: JobRequest) -> tuple[str, Callable[[Progress], dict[str, Any]]]:
         """Return what a job does and the function that does it, after quick checks."""
-        if not isinstance(request, ScoreRequest):
-            self._files.held(request.file)
-            return self._work_with_file(request)
-        if (request.task is None) == (request.task_yaml is None):
-            raise ServiceError("give 'task' or 'task_yaml', and not both.")
-        check_names(request.task, request.environment, request.robot)
-        dexterity(request.measure)
-        if isinstance(request, ScoreHereRequest):
-            work = partial(self._work.score_here, request)
-            return "score-here", self._plainly(work, import_scoring)
-        return "score", self._plainly(partial(self._work.score, request), import_scoring)
-
-    def _work_with_file(
-        self, request: JobRequest
-    ) -> tuple[str, Callable[[Progress], dict[str, Any]]]:
-        """Return what a job with a score file does and the function that does it."""
-        work: dict[type[Any], tuple[str, Callable[[Any, Progress], dict[str, Any]]]] = {
-            EvaluateRequest: ("evaluate", self._work.evaluate),
-            PlanRequest: ("plan", self._work.plan),
-            SceneRequest: ("scene", self._work.scene),
-            PopulationRequest: ("population", self._set_work.population),
-            RefineRequest: ("refine", self._set_work.refine),
-            MotionsRequest: ("motions", self._set_work.motions),
-            RescoreRequest: ("rescore", self._work.rescore),
-        }
-        what, done = work[type(request)]
-        return what, self._plainly(partial(done, request))
+        what = _NAMES[type(request)]
+        if isinstance(request, ScoreRequest):
+            if (request.task is None) == (request.task_yaml is None):
+                raise ServiceError("give 'task' or 'task_yaml', and not both.")
+            check_names(request.task, request.environment, request.robot)
+            dexterity(request.measure)
+            is_described = request.task_yaml is not None or request.environment_yaml is not None
+        else:
+            is_described = self._files.held(request.file).is_described
+        if is_described:
+            return what, partial(self._described.do, what, request)
+        prepared = import_scoring if isinstance(request, ScoreRequest) else import_heavy
+        return what, self._plainly(partial(self._jobs_by_name[what], request), prepared)
 
     def _plainly(
         self,
         work: Callable[[Progress], dict[str, Any]],
-        prepared: Callable[[], None] = import_heavy,
+        prepared: Callable[[], None],
     ) -> Callable[[Progress], dict[str, Any]]:
         """Return work whose result JSON can hold, and whose messages name no temporary folder.
 
@@ -404,13 +387,7 @@ class Engine:
             try:
                 prepared()
                 return dict(without_infinities(work(progress)))
-            except UnknownNameError as error:
-                where = self._sent.without_folder(error.where)
-                raise UnknownNameError(error.what, error.name, error.known, where=where) from None
             except TcsError as error:
-                message = self._sent.without_folder(str(error))
-                if message == str(error):
-                    raise
-                raise ServiceError(message) from None
+                raise self._sent.without_folder(error) from None
 
         return done

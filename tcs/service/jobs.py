@@ -33,6 +33,14 @@ class Progress:
         """
         self._jobs.update(self._job, done=done, total=total, note="")
 
+    def check(self) -> None:
+        """Raise if the job is to end.
+
+        Raises:
+            CancelledError: As above.
+        """
+        self._jobs.check(self._job)
+
     def compiling(self) -> None:
         """Record that the kernel is compiled first."""
         self._jobs.update(self._job, note="compiling for this machine, up to a minute")
@@ -169,14 +177,18 @@ class Jobs:
             job.note = note
             if done is not None and total is not None:
                 job.done, job.total = int(done), int(total)
-            if job.is_cancelled:
-                raise CancelledError("the job was cancelled.")
-            if time.monotonic() - job.begun > self._limits.job_seconds:
-                raise CancelledError(
-                    f"the job took longer than {self._limits.job_seconds:g} s, the limit of this "
-                    "server. Restrict it, e.g. with `only`."
-                )
+            self.check(job)
             self._changed.notify_all()
+
+    def check(self, job: _Job) -> None:
+        """Raise if a job is to end; as `Progress`."""
+        if job.is_cancelled:
+            raise CancelledError("the job was cancelled.")
+        if time.monotonic() - job.begun > self._limits.job_seconds:
+            raise CancelledError(
+                f"the job took longer than {self._limits.job_seconds:g} s, the limit of this "
+                "server. Restrict it, e.g. with `only`."
+            )
 
     def close(self) -> None:
         """Cancel every job; the running one ends where it next reports its progress."""

@@ -4,6 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+SMALL_REQUEST = 1024
+"""Most bytes of a request that is read where all requests are answered; larger ones are read, and
+answered from score files, in a process of their own."""
+MOST_VERTICES = 5000
+"""Most vertices of all regions of a request."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
@@ -27,6 +33,16 @@ class Limits:
     """Most bytes of a request other than a score file."""
     content_bytes: int = 256 * 1024**2
     """Most bytes of the contents of all requests that arrive or are answered at the same time."""
+    parse_seconds: float = 20.0
+    """Longest time in which a large request or a score file that was sent is read [s]."""
+    parse_bytes: int = 1024**3
+    """Most memory that reading it takes."""
+    parsing: int = 2
+    """Processes that read."""
+    scene_bytes: int = 4 * 1024**3
+    """Most memory of the process that builds and scores scenes that clients describe."""
+    document_bytes: int = 32 * 1024**2
+    """Most bytes of the task and environment files that are kept; the oldest go first."""
     requests_at_once: int = 128
     """Most requests that are answered at the same time."""
     request_seconds: float = 30.0

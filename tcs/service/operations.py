@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass
+from typing import Any
 
 from tcs.files.documents import Document
 from tcs.service.requests import (
@@ -35,6 +37,22 @@ class Operation:
     """Whether it is queued as a job."""
     takes_turns: bool = False
     """Whether requests about one score file are answered one after the other."""
+    bounded: frozenset[str] = frozenset()
+    """Fields, beside those of the robot's state, with which its work depends on the file alone."""
+
+    def kind_of(self, request: Any) -> Hashable | None:
+        """Return what requests that take equally long have in common; None if that is not known.
+
+        Where the robot is does not change the work: every set of the file is compared, once.
+        """
+        fields = request.model_fields_set - _STATE
+        if not self.bounded or not fields <= self.bounded:
+            return None
+        return (
+            self.name,
+            request.here is None,
+            *((name, repr(getattr(request, name))) for name in sorted(fields)),
+        )
 
     @property
     def path(self) -> str:
@@ -47,8 +65,14 @@ class Operation:
         return " ".join((self.request.__doc__ or "").split())
 
 
+_STATE = {"here", "torso", "at"}
+_WEIGHTS = frozenset(
+    "file alpha beta gamma delta metre_weight turn_weight torso_weight place_penalty "
+    "environment_penalty preference_penalty max_members".split()
+)
+
 OPERATIONS = (
-    Operation("select", SelectRequest, is_job=False, takes_turns=True),
+    Operation("select", SelectRequest, is_job=False, takes_turns=True, bounded=_WEIGHTS),
     Operation("explain", ExplainRequest, is_job=False, takes_turns=True),
     Operation("floor", FloorRequest, is_job=False, takes_turns=True),
     Operation("outcome", OutcomeRequest, is_job=False, takes_turns=True),

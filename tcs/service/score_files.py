@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import itertools
+import shutil
 import threading
 from collections import OrderedDict
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from tcs.errors import BusyError, NotFoundError, ServiceError, StoreError
 from tcs.files.paths import is_path
 from tcs.files.reading import read_bytes
 from tcs.files.writing import scratch_folder
-from tcs.output.words import frame_name, person_text
 from tcs.placement.store import (
     MotionFile,
     ScoreFile,
@@ -24,6 +25,8 @@ from tcs.placement.store import (
 )
 from tcs.service.limits import Limits
 from tcs.service.responses import FileEntry
+from tcs.service.sent_content import entry_of, entry_of_file
+from tcs.service.worker import WorkerPool
 
 
 @dataclass(eq=False)
@@ -39,21 +42,35 @@ class HeldFile:
     """Whether it stays until the service ends."""
     number: int
     """Number of the file, in the order in which they came."""
+    is_described: bool
+    """Whether its scene is one that a client described, which is built in a process of its own."""
     lock: threading.RLock = field(default_factory=threading.RLock)
     """Held while the file is read: what selection derives from it is kept in it."""
+
+    def __reduce__(self) -> Any:
+        """Return it for another process, with a lock of that process."""
+        return HeldFile, (
+            self.entry,
+            self.path,
+            self.is_ours,
+            False,
+            self.number,
+            self.is_described,
+        )
 
 
 class ScoreFiles:
     """Score files in a temporary folder; the most recently used are in memory."""
 
-    def __init__(self, folder: Path, limits: Limits) -> None:
+    def __init__(self, folder: Path, limits: Limits, parsing: WorkerPool) -> None:
         """Hold no file yet.
 
         Args:
             folder: An empty folder for the copies.
             limits: Bounds of number and size.
+            parsing: Reads files that are sent.
         """
-        self._folder, self._limits = folder, limits
+        self._folder, self._limits, self._parsing = folder, limits, parsing
         self._lock = threading.RLock()
         self._held: OrderedDict[str, HeldFile] = OrderedDict()
         self._loaded: OrderedDict[str, ScoreFile] = OrderedDict()
@@ -78,29 +95,75 @@ class ScoreFiles:
                 "are accepted."
             )
         digest = hashlib.sha256(content).hexdigest()
-        with self._lock:
-            if digest not in self._held:
-                self._make_space(len(content))
-                path = self._folder / f"{digest}.tcs"
+        if not self._uses(digest, is_ours=is_ours, is_pinned=is_pinned):
+            with scratch_folder() as folder:
+                path = folder / "sent.tcs"
                 path.write_bytes(content)
+                # Outside the lock: it takes up to seconds, in which other files are used.
                 try:
-                    loaded = load_scores(path)
+                    entry = self._entry_of(path, digest, is_ours=is_ours)
                 except StoreError as error:
-                    path.unlink()
                     raise type(error)(str(error).replace(f" '{path}'", " that was sent")) from None
-                self._held[digest] = HeldFile(
-                    _entry(digest, len(content), loaded),
-                    path,
-                    is_ours,
-                    is_pinned,
-                    next(self._number),
+                self.adopt(path, entry, is_ours=is_ours, is_pinned=is_pinned)
+        return self.held(digest)
+
+    def adopt(
+        self,
+        path: Path,
+        entry: FileEntry,
+        *,
+        is_ours: bool = True,
+        is_pinned: bool = False,
+        is_described: bool = False,
+    ) -> HeldFile:
+        """Hold a score file that was checked; its file is moved into the folder.
+
+        Args:
+            path: The file.
+            entry: What it is of.
+            is_ours: Whether it was made here or named when the service started.
+            is_pinned: Whether it stays until the service ends.
+            is_described: Whether its scene is one that a client described.
+
+        Raises:
+            BusyError: If it does not fit beside the pinned files.
+        """
+        with self._lock:
+            if not self._uses(entry.file, is_ours=is_ours, is_pinned=is_pinned):
+                self._make_space(entry.bytes)
+                kept = self._folder / f"{entry.file}.tcs"
+                shutil.move(path, kept)
+                self._held[entry.file] = HeldFile(
+                    entry, kept, is_ours, is_pinned, next(self._number), is_described
                 )
-                self._remember(digest, loaded)
-            held = self._held[digest]
+            return self._held[entry.file]
+
+    def lend(self, held: HeldFile) -> None:
+        """Hold a file of another process, at its path there."""
+        with self._lock:
+            self._held[held.entry.file] = held
+
+    def _uses(self, digest: str, *, is_ours: bool, is_pinned: bool) -> bool:
+        """Return whether a file is held; it is then the most recently used one."""
+        with self._lock:
+            held = self._held.get(digest)
+            if held is None:
+                return False
             held.is_ours |= is_ours
             held.is_pinned |= is_pinned
             self._held.move_to_end(digest)
-            return held
+            return True
+
+    def _entry_of(self, path: Path, digest: str, *, is_ours: bool) -> FileEntry:
+        """Return what a score file is of; one that was sent is read in a process of its own."""
+        if is_ours:
+            file = load_scores(path)
+            self._remember(digest, file)
+            return entry_of(file, digest, path.stat().st_size)
+        entry: FileEntry = self._parsing.call(
+            entry_of_file, path, digest, seconds=self._limits.parse_seconds, what="the score file"
+        )
+        return entry
 
     def add_made(self, file: ScoreFile) -> HeldFile:
         """Hold a score file that was made here.
@@ -228,9 +291,10 @@ class ScoreFiles:
                 self._motions.popitem(last=False)
 
     def _remember(self, digest: str, file: ScoreFile) -> None:
-        self._loaded[digest] = file
-        while len(self._loaded) > self._limits.loaded_files:
-            self._loaded.popitem(last=False)
+        with self._lock:
+            self._loaded[digest] = file
+            while len(self._loaded) > self._limits.loaded_files:
+                self._loaded.popitem(last=False)
 
     def _make_space(self, size: int) -> None:
         """Remove the least recently used files until another one fits."""
@@ -240,26 +304,8 @@ class ScoreFiles:
             oldest = next((d for d, held in self._held.items() if not held.is_pinned), None)
             if oldest is None:
                 raise BusyError("the score file does not fit beside those that are kept.")
-            self._held.pop(oldest).path.unlink(missing_ok=True)
+            path = self._held.pop(oldest).path
+            # Not that of another process.
+            if path.parent == self._folder:
+                path.unlink(missing_ok=True)
             self._loaded.pop(oldest, None)
-
-
-def _entry(digest: str, size: int, file: ScoreFile) -> FileEntry:
-    names = {
-        key: str(getattr(file, key).get("name", file.metadata[key]))
-        for key in ("task", "environment", "robot")
-    }
-    person = [person_text(file.metadata["person"])] if "person" in file.metadata else []
-    return FileEntry(
-        file=digest,
-        bytes=size,
-        **names,
-        title=" · ".join([*(frame_name(name) for name in names.values()), *file.arms, *person]),
-        goals=file.nominal.sets.weights.size,
-        configurations=file.configurations.size,
-        settings=[
-            f"{axis.name}_deg" if axis.unit == "deg" else axis.name
-            for axis in file.configurations.environment_axes
-        ],
-        body_frames=list(file.body_frames),
-    )

@@ -81,3 +81,20 @@ def test_without_preparation_it_is_ready_at_once(capsys):
     _say_ready(engine, "at http://127.0.0.1:1", prepare=False)
     assert capsys.readouterr().err == "tcs: at http://127.0.0.1:1\n"
     assert engine.on_end is None
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--mcp", "--port", 9000), "--port: is for HTTP, not for --mcp"),
+        (("--ros1", "--token", "x" * 20), "--token: is for HTTP, not for --ros1"),
+        (("--router", "tcp/localhost:1"), "--router: is for --ros2, not for HTTP"),
+        (("--max-age", 2), "--max-age: is for --ros1 and --ros2, not for HTTP"),
+        (("--mcp", "--no-prepare"), "--prepare: is for HTTP and --ros1 and --ros2, not for --mcp"),
+    ],
+    ids=["port", "token", "router", "frames", "prepare"],
+)
+def test_options_of_other_modes_are_refused(tcs_command, words, message):
+    ran = tcs_command("serve", *words)
+    assert ran.code == 2
+    assert message in " ".join(ran.err.replace("│", " ").replace("'", "").split())

@@ -1,4 +1,5 @@
 import pathlib
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -48,3 +49,13 @@ def test_a_value_that_expands_to_billions_is_refused():
         value = [value, value]
     with pytest.raises(StoreError, match="levels or"):
         plain("metadata", value)
+
+
+def test_a_long_key_is_not_copied_for_each_of_its_values():
+    # Within a file of a megabyte, the names of the values would take a terabyte in all.
+    value = {"k" * 10**6: [0] * 3}
+    tracemalloc.start()
+    assert plain("metadata", value) == value
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 1e6

@@ -3,6 +3,7 @@
 import os
 import pickle
 import struct
+import tracemalloc
 import zlib
 
 import joblib
@@ -232,3 +233,32 @@ def test_arrays_are_read_as_joblib_wrote_them(path, dtype, shape, compress):
         np.testing.assert_array_equal(got[order], values)
         assert got[order].dtype.isnative
         assert got[order].shape == shape
+
+
+def test_keys_that_are_not_text_are_refused(path):
+    # Whole numbers that are multiples of this one have the same hash: a dict of them takes forever.
+    same = (1 << 61) - 1
+    for content in ({0: None}, {i * same: None for i in range(3)}, {"a": {1.5: None}}):
+        path.write_bytes(pickle.dumps(content))
+        with pytest.raises(StoreFormatError, match="keys must be text"):
+            load_scores(path)
+
+
+@pytest.mark.parametrize("operations", [b"}", b"]\x94"], ids=["dicts", "memo"])
+def test_objects_take_at_most_twice_the_memory_of_the_bytes(path, operations, monkeypatch):
+    monkeypatch.setattr(reader, "FREE_OPERATIONS", 1000)
+    path.write_bytes(b"\x80\x04" + operations * 1_000_000 + b".")
+    tracemalloc.start()
+    with pytest.raises(StoreFormatError, match="far more values than a file of tcs"):
+        load_scores(path)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    # The bytes themselves are read with a copy.
+    assert most < 4 * path.stat().st_size + 1e6
+
+
+def test_a_wrapped_file_decompresses_to_some_times_its_size(path, monkeypatch):
+    monkeypatch.setattr(reader, "FREE_BYTES", 1000)
+    path.write_bytes(zlib.compress(os.urandom(20_000) + bytes(1_000_000)))
+    with pytest.raises(StoreFormatError, match="decompresses to more than"):
+        load_scores(path)

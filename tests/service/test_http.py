@@ -12,13 +12,15 @@ import time
 import httpx
 import pytest
 
-from tcs.errors import OutputError, ServiceError
+from tcs.errors import OutputError, SelectionError, ServiceError
 from tcs.placement.store import save_scores
 from tcs.service import Engine, Limits, SelectRequest
 from tcs.service.client import Client
 from tcs.service.http import Access, Server, checked_access, make_application, protocol
 from tcs.service.http.file_queues import QUEUES, QUICK, STREAK, FileQueues
 from tcs.service.http.protocol import MOST_HEAD_BYTES, MOST_PIPELINED, BoundedProtocol
+from tcs.service.limits import SMALL_REQUEST
+from tcs.service.operations import OPERATIONS
 from tests.placement.store.example import score_file
 
 TOKEN = "a-token-of-24-characters"
@@ -38,7 +40,8 @@ def server(engine):
 
 @pytest.fixture(scope="module")
 def http(server):
-    with httpx.Client(base_url=server.url, trust_env=False) as http:
+    # The first large request waits for a process that starts.
+    with httpx.Client(base_url=server.url, trust_env=False, timeout=60.0) as http:
         yield http
 
 
@@ -440,3 +443,59 @@ def test_malformed_requests_are_answered(http, valid, caplog):
         if response.status_code != 200 and response.status_code != 202:
             refused(response, response.status_code)
     assert [record for record in caplog.records if record.exc_info] == []
+
+
+def test_the_work_of_a_request_is_known_where_it_depends_on_the_file_alone(valid):
+    select = next(one for one in OPERATIONS if one.name == "select")
+
+    def kind(**fields):
+        return select.kind_of(SelectRequest(**{**valid, **fields}))
+
+    assert kind() == kind(here=(0.0, 0.0, 0.0), torso=0.1) is not None
+    assert kind(alpha=0.5) != kind(alpha=0.6)
+    square = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)]
+    for fields in ({"forbid": [square]}, {"travel": "around"}, {"top": 3}, {"only": ["torso < 1"]}):
+        assert kind(**fields) is None
+    assert [one.name for one in OPERATIONS if one.bounded] == ["select"]
+
+
+def test_regions_have_a_number_of_vertices_together(engine, valid):
+    polygon = [(0.001 * i, (i % 2) / 2) for i in range(1000)]
+    with pytest.raises(SelectionError, match="'forbid': the regions have 6,000 vertices; at most"):
+        engine.select(SelectRequest(**valid, forbid=[polygon] * 6))
+
+
+def test_large_requests_are_read_in_another_process(http, engine, valid, monkeypatch):
+    called = []
+    call = engine._parsing.call
+    monkeypatch.setattr(
+        engine._parsing,
+        "call",
+        lambda *given, **options: called.append(given) or call(*given, **options),
+    )
+    small = http.post("/v1/select", json=valid)
+    assert (small.status_code, called) == (200, [])
+    spaces = json.dumps(valid) + " " * SMALL_REQUEST
+    large = http.post("/v1/select", content=spaces, headers={"Content-Type": "application/json"})
+    assert len(called) == 2
+    assert {**large.json(), "seconds": 0} == {**small.json(), "seconds": 0}
+    refused(http.post("/v1/select", json={**valid, "x" * SMALL_REQUEST: 1}), 422)
+
+
+def test_files_are_listed_while_another_one_is_read(http, engine, monkeypatch):
+    reading, may_end, call = threading.Event(), threading.Event(), engine._parsing.call
+
+    def slow(*given, **options):
+        reading.set()
+        assert may_end.wait(60.0)
+        return call(*given, **options)
+
+    monkeypatch.setattr(engine._parsing, "call", slow)
+    sending = threading.Thread(target=lambda: http.post("/v1/files", content=b"none"))
+    sending.start()
+    try:
+        assert reading.wait(60.0)
+        assert http.get("/v1/files", timeout=5.0).status_code == 200
+    finally:
+        may_end.set()
+        sending.join()

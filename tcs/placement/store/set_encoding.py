@@ -105,10 +105,10 @@ def decode_sets(encoded: dict[str, Any], grid: Grid) -> SetTable:
     step = decompress(encoded, "pair_step", "u", (AtMost(len(cell_xy) ** 2),))
     kept = (step.size,)
     numbers = ascending_from(step, len(cell_xy) ** 2 + 1, "pairs of cells")
-    code = decompress(encoded, "reachability_code", "u", kept).astype(np.int64)
+    code = decompress(encoded, "reachability_code", "u", kept)
     if np.any(code >= values.size):
         raise StoreFormatError(f"has a reachability code beyond its {values.size} values")
-    pair_cells = np.stack(np.divmod(numbers, max(len(cell_xy), 1)), axis=1)
+    pair_cells = _digits(numbers, len(cell_xy), 2)
     return SetTable(
         **{name: encoded[name] for name in _PLAIN},
         tile=encoded.get("tile", 0.0),
@@ -119,7 +119,7 @@ def decode_sets(encoded: dict[str, Any], grid: Grid) -> SetTable:
         dexterity=dexterity,
         cell=_int32(decompress(encoded, "cell", "u", candidates.shape)),
         cell_xy=cell_xy,
-        pair_cells=pair_cells.astype(np.int32),
+        pair_cells=pair_cells,
         pair_count=decompress(encoded, "pair_count", "u", kept).astype(np.int64),
         pair_reachability=values[code],
         pair_manipulability=decompress(encoded, "pair_manipulability", "f4", kept),
@@ -158,15 +158,25 @@ def _decode_groups(encoded: object, cells: int) -> Groups | None:
     wide = {"reachability": "f8", "member_reachability": "f8"}
     return Groups(
         least=encoded["least"],
-        cells=np.stack(
-            [number // cells**2, number // cells % cells, number % cells]
-            if cells
-            else [number] * 3,
-            axis=1,
-        ).astype(np.int32),
+        cells=_digits(number, cells, 3),
         count=decompress(encoded, "count", "u", number.shape).astype(np.int64),
         **{name: decompress(encoded, name, wide.get(name, "f4"), (None,)) for name in BOUNDS},
     )
+
+
+def _digits(numbers: NDArray[np.int64], base: int, count: int) -> NDArray[np.int32]:
+    """Return the digits of numbers >= 0, which are used up; the most significant comes first.
+
+    The columns are made one after the other: together, in 64 bits, they would take several times
+    the memory of the result.
+    """
+    digits, base = np.empty((len(numbers), count), dtype=np.int32), max(base, 1)
+    for column in reversed(range(1, count)):
+        digits[:, column] = numbers % base
+        numbers //= base
+    # Not less than the base in a file that was changed: the table refuses it.
+    digits[:, 0] = numbers
+    return digits
 
 
 def _decode_lattice(encoded: object) -> BaseLattice:

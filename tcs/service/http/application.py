@@ -14,14 +14,15 @@ from fastapi.responses import HTMLResponse, StreamingResponse
 from fastapi.routing import APIRoute
 
 from tcs.errors import BusyError, DataFileError, TcsError
-from tcs.files.documents import checked
 from tcs.service.engine import Engine
 from tcs.service.http import description
 from tcs.service.http.file_queues import FileQueues
 from tcs.service.http.guard import Access, Guard
 from tcs.service.http.problems import problem, problem_of
+from tcs.service.limits import SMALL_REQUEST
 from tcs.service.operations import OPERATIONS, Operation
 from tcs.service.responses import JobStatus
+from tcs.service.sent_content import request_of
 
 _ABOUT = (
     "Where should an assistive robot stand? Requests have the options of the command line with the "
@@ -72,9 +73,11 @@ def make_application(engine: Engine, access: Access) -> FastAPI:
     app.add_exception_handler(404, _on_unknown_path)
     app.add_exception_handler(405, _on_unknown_path)
     queues = FileQueues()
+    # What waits to be read takes no thread from other requests.
+    reading = anyio.CapacityLimiter(engine.limits.parsing)
     for operation in OPERATIONS:
-        _add_operation(app, engine, operation, queues)
-    _add_files(app, engine)
+        _add_operation(app, engine, operation, queues, reading)
+    _add_files(app, engine, reading)
     _add_jobs(app, engine)
     _add_description(app, engine)
     return app
@@ -90,7 +93,13 @@ async def _on_unknown_path(request: Request, _error: Exception) -> Response:
     return problem(404, "NotFoundError", f"there is no {request.method} {path}. See /docs.")
 
 
-def _add_operation(app: FastAPI, engine: Engine, operation: Operation, queues: FileQueues) -> None:
+def _add_operation(
+    app: FastAPI,
+    engine: Engine,
+    operation: Operation,
+    queues: FileQueues,
+    reading: anyio.CapacityLimiter,
+) -> None:
     """Add a request with a body of JSON."""
     answer: Callable[[Any], Any] = engine.submit
     if not operation.is_job:
@@ -98,9 +107,20 @@ def _add_operation(app: FastAPI, engine: Engine, operation: Operation, queues: F
 
     async def endpoint(request: Request) -> Response:
         content = await _json_of(request)
-        checked_request: Any = checked(content, operation.request, "request", DataFileError)
+        if len(content) <= SMALL_REQUEST:
+            checked_request = request_of(operation.request, content)
+        else:
+            checked_request = await anyio.to_thread.run_sync(
+                engine.request_of, operation.request, content, limiter=reading
+            )
+            if operation.takes_turns:
+                # So that nobody waits for it who asks about the same file.
+                found = await anyio.to_thread.run_sync(
+                    engine.answer_apart, operation.name, checked_request, limiter=reading
+                )
+                return _json(found)
         if operation.takes_turns:
-            kind = (operation.name, frozenset(checked_request.model_fields_set))
+            kind = operation.kind_of(checked_request)
             text = await queues.run(
                 checked_request.file, kind, lambda: _text(answer(checked_request))
             )
@@ -118,7 +138,7 @@ def _add_operation(app: FastAPI, engine: Engine, operation: Operation, queues: F
     )  # fmt: skip
 
 
-def _add_files(app: FastAPI, engine: Engine) -> None:
+def _add_files(app: FastAPI, engine: Engine, reading: anyio.CapacityLimiter) -> None:
     """Add the requests about score files, and the catalogue."""
 
     async def known() -> Response:
@@ -129,7 +149,7 @@ def _add_files(app: FastAPI, engine: Engine) -> None:
 
     async def send(request: Request) -> Response:
         content = await request.body()
-        entry = await anyio.to_thread.run_sync(engine.add_file, content)
+        entry = await anyio.to_thread.run_sync(engine.add_file, content, limiter=reading)
         return _json(entry.model_dump(), status=201)
 
     async def fetch(file: str) -> Response:
@@ -259,23 +279,16 @@ def _route(
     )  # fmt: skip
 
 
-async def _json_of(request: Request) -> dict[str, Any]:
-    """Return the JSON object of a request.
+async def _json_of(request: Request) -> bytes:
+    """Return the content of a request in JSON.
 
     Raises:
-        DataFileError: If it is not one.
+        DataFileError: If it is of another type.
     """
     media_type = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if media_type != _JSON:
         raise DataFileError("request: the content type must be application/json.")
-    try:
-        content = json.loads(await request.body())
-    except (ValueError, RecursionError) as error:
-        why = "too deep" if isinstance(error, RecursionError) else str(error)
-        raise DataFileError(f"request is not valid JSON: {why}.") from None
-    if not isinstance(content, dict):
-        raise DataFileError("request must be a JSON object.")
-    return content
+    return await request.body()
 
 
 def _json(content: Any, status: int = 200) -> Response:

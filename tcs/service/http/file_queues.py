@@ -48,9 +48,14 @@ class _Pace:
         # Time of the processor: the wait for another thread says nothing about the next answer.
         begun = time.thread_time()
         try:
-            return answer()
-        finally:
-            self.streak = self.streak + 1 if time.thread_time() - begun <= QUICK else 0
+            answered = answer()
+        except BaseException:
+            # A refusal says nothing about the time of an answer.
+            if time.thread_time() - begun > QUICK:
+                self.streak = 0
+            raise
+        self.streak = self.streak + 1 if time.thread_time() - begun <= QUICK else 0
+        return answered
 
 
 class FileQueues:
@@ -68,15 +73,16 @@ class FileQueues:
         self._queues = [_Queue(ThreadPoolExecutor(1, f"tcs-queue-{i}")) for i in range(QUEUES)]
         self._paces: OrderedDict[Hashable, _Pace] = OrderedDict()
 
-    async def run(self, file: str, kind: Hashable, answer: Callable[[], Answer]) -> Answer:
+    async def run(self, file: str, kind: Hashable | None, answer: Callable[[], Answer]) -> Answer:
         """Return the answer to a request about a file.
 
         Args:
             file: Digest of the file, in hexadecimal digits.
-            kind: What requests that take equally long have in common.
+            kind: What requests that take equally long have in common; None if that is not known.
             answer: Answers the request.
         """
-        queue, pace = self._queues[int(file[:_DIGITS], 16) % QUEUES], self._pace((file, kind))
+        queue = self._queues[int(file[:_DIGITS], 16) % QUEUES]
+        pace = _Pace() if kind is None else self._pace((file, kind))
         is_slow = not pace.is_quick
         if not is_slow and not queue.slow:
             return pace.timed(answer)
