@@ -244,7 +244,10 @@ class Reach:
         p = self._problem
         kept: Any = {
             name: getattr(p, name)[part].copy()
-            for name in ("base_R", "base_p", "body", "body_A", "body_spheres")
+            for name in (
+                *("base_R", "base_p", "body", "body_A", "body_spheres"),
+                *("rest", "rest_spheres"),
+            )
         }
         return p._replace(**kept, torso_levels=1)
 

@@ -140,6 +140,10 @@ class SceneArrays(NamedTuple):
     (goals, 9); no rows if every goal is a single pose."""
     distances: BodyDistances = NO_DISTANCES
     """Tables of distances of bodies of the robot."""
+    rest: FloatArray = np.empty((0, 7))
+    """Rest postures of the arm [rad], in the order in which they are tried, shape (n, 7). Where the
+    arm touches the environment in all of them, so does the robot's body; without one, it is not
+    checked."""
 
 
 class GridArrays(NamedTuple):

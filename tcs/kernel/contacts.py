@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, int_constant, jit
-from tcs.kernel.collide import BOUND, CENTRE, closer, spheres_overlap
+from tcs.kernel.collide import BOUND, CENTRE, closer, sphere_is_near, spheres_overlap
 from tcs.kernel.distances import are_apart
 from tcs.kernel.group_contacts import group_touches
 from tcs.kernel.kinematics import link_poses
@@ -63,6 +63,55 @@ def base_contact(problem: Problem, work: Workspace, torso: int, mount: int) -> i
                     problem, problem.body_body[i], problem.environment_body[j], ENVIRONMENT
                 )
     return NO_CONTACT
+
+
+@inner
+def upper_contact(problem: Problem, work: Workspace, torso: int) -> int:
+    """Return the first contact of what the base carries at a stop: torso, head, arms at rest.
+
+    With `base_contact` of what is fixed to the base, it decides whether a configuration counts.
+    `work.environment_B` must be up to date.
+    """
+    code = base_contact(problem, work, torso, TORSO_MOUNTED)
+    return code if code != NO_CONTACT else rest_contact(problem, work, torso)
+
+
+@inner
+def rest_contact(problem: Problem, work: Workspace, torso: int) -> int:
+    """Return the first contact of the arm in its first rest posture with the environment.
+
+    If another rest posture touches nothing, neither does this one: NO_CONTACT.
+    """
+    code, touching = NO_CONTACT, work.touching
+    for n in range(problem.rest.shape[1]):
+        found = touches_at_rest(problem, work, torso, n)
+        if not found:
+            return NO_CONTACT
+        if n == 0:
+            code = pair_code(problem, ENVIRONMENT, touching[0], touching[1])
+    return code
+
+
+@inner
+def touches_at_rest(problem: Problem, work: Workspace, torso: int, n: int) -> bool:
+    """Return whether the arm in rest posture n touches the environment; fills `work.touching`."""
+    environment, gaps = work.environment_B, problem.gap_environment
+    arm, spheres = problem.rest[torso, n], problem.rest_spheres[torso]
+    groups, boxes, widest = problem.link_groups, len(problem.link_body), problem.widest_gap
+    for j in range(len(environment)):
+        if not spheres_overlap(spheres, n, environment, j, widest) or not sphere_is_near(
+            spheres, n, environment, j, widest
+        ):
+            continue
+        for g in range(len(groups.first) - 1):
+            gap = gaps[boxes + g, j]
+            if (
+                gap > 0.0
+                and spheres_overlap(arm, boxes + g, environment, j, gap)
+                and group_touches(arm, groups, g, environment, j, gaps, work.touching)
+            ):
+                return True
+    return False
 
 
 @inner

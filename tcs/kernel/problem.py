@@ -22,6 +22,7 @@ from tcs.kernel.dexterity import DEFAULT_MEASURE, Dexterity, dexterity
 from tcs.kernel.distances import DistanceTables, arranged
 from tcs.kernel.freedom.goals import FreeGoals, axis_left_free, free_goals
 from tcs.kernel.groups import ShapeGroups, groups_of, with_boxes, with_group_rows
+from tcs.kernel.resting import resting_arm
 
 UNCHECKED = -1.0
 """Gap of a pair of shapes that is not checked."""
@@ -119,6 +120,11 @@ class Problem(NamedTuple):
     environment_states: int
     distances: DistanceTables
     """Tables of distances of bodies of the robot."""
+    rest: FloatArray
+    """The rows of `links` in B with the arm in each rest posture, shape
+    (torso levels, postures, arm rows, 17)."""
+    rest_spheres: FloatArray
+    """The bounding sphere of each, as a packed shape in B, shape (torso levels, postures, 17)."""
 
 
 def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_MEASURE) -> Problem:
@@ -149,6 +155,7 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
     in_boxes = np.array([inside[0] for inside in link_groups.in_boxes()], np.int64)
     packed = pack(scene.body)
     bodies = with_boxes(np.concatenate([packed, pack(body_A)]), body_groups)
+    rest, rest_spheres = resting_arm(scene, order, link_groups)
     robot_bodies = max(_count(scene.arm), _count(scene.body))
     return Problem(
         measure=dexterity(measure),
@@ -200,6 +207,8 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
         torso_levels=grid.torso_levels,
         environment_states=grid.environment_states,
         distances=arranged(scene.distances, robot_bodies),
+        rest=rest,
+        rest_spheres=rest_spheres,
     )
 
 

@@ -10,11 +10,11 @@ from tcs.kernel.cache import inner, jit
 from tcs.kernel.contacts import (
     BASE_FIXED,
     NO_CONTACT,
-    TORSO_MOUNTED,
     base_contact,
     gripper_body_contact,
     gripper_contact_at,
     gripper_environment_contact,
+    upper_contact,
 )
 from tcs.kernel.dexterity.measures import measure_at, rounded_inward
 from tcs.kernel.freedom.forms import FEWEST_JOINTS, pose_of
@@ -148,7 +148,7 @@ def _score_slice(
             base_code = base_contact(problem, work, BASE_FIXED, BASE_FIXED)
         code = base_code
         if code == NO_CONTACT:
-            code = base_contact(problem, work, torso, TORSO_MOUNTED)
+            code = upper_contact(problem, work, torso)
         if code != NO_CONTACT:
             scores.reason[row] = BODY_BLOCKED
             scores.contact[row] = code

@@ -35,7 +35,7 @@ def outcomes_key(arms: Sequence[StopGrid], seed: int) -> str:
         for text in (repr(arm.job.task), *documents):
             sha.update(text.encode() + b"\0")
         sha.update(arm.lowered.digest().encode())
-        for rates in (arm.rest, arm.velocity, arm.acceleration):
+        for rates in (arm.rests, arm.velocity, arm.acceleration):
             sha.update(np.asarray(rates, dtype="<f8").tobytes())
     return sha.hexdigest()
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -65,8 +66,8 @@ class StopGrid:
     """Scene and configurations as arrays, with the boxes that paths keep out of."""
     problem: Problem
     """The same as the kernel takes it."""
-    rest: FloatArray
-    """Rest posture of the arm [rad], shape (7,)."""
+    rests: FloatArray
+    """Rest postures of the arm [rad], in the order in which they are tried, shape (n, 7)."""
     velocity: FloatArray
     """Velocity limits [rad/s], shape (7,)."""
     acceleration: FloatArray
@@ -104,7 +105,7 @@ class StopGrid:
             configurations=grid,
             lowered=lowered,
             problem=build_problem(lowered.arrays, lowered.grid),
-            rest=np.array(job.spec.robot.arm_rest()),
+            rests=np.array(list(job.spec.robot.rest_postures().values())),
             velocity=np.array(velocity),
             acceleration=np.array(acceleration),
         )
@@ -226,10 +227,12 @@ class Stop:
         """The scene as arrays."""
         return self.grid.problem
 
-    @property
+    @cached_property
     def rest(self) -> FloatArray:
-        """Rest posture of the arm [rad], shape (7,)."""
-        return self.grid.rest
+        """The first rest posture without contact, or the first of all if none is [rad], (7,)."""
+        rests = self.grid.rests
+        free = (q for q in rests if self.contact_at(q) is None)
+        return rests[0] if len(rests) == 1 else next(free, rests[0])
 
     @property
     def velocity(self) -> FloatArray:

@@ -99,7 +99,6 @@ class ScenePostures:
         arm: Sequence[Sequence[float]],
     ) -> dict[str, Any]:
         from tcs.model.scene import goal_poses
-        from tcs.output.view.scene_objects import resting_arm
 
         shown = self._scene(digest, file)
         scene = shown.scene
@@ -109,7 +108,7 @@ class ScenePostures:
         scene.place_base(member.base_x, member.base_y, member.base_yaw)
         scene.set_torso(member.torso)
         joints = None if goal is None else file.nominal.scores.joints_of(index, goal)
-        postures = [resting_arm(scene) if joints is None else joints]
+        postures = [scene.resting_arm() if joints is None else joints]
         if len(arm):
             count = len(postures[0])
             if any(len(one) != count for one in arm):

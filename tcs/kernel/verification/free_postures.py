@@ -8,11 +8,11 @@ from tcs.kernel.cache import jit
 from tcs.kernel.contacts import (
     BASE_FIXED,
     NO_CONTACT,
-    TORSO_MOUNTED,
     arm_contact,
     base_contact,
     gripper_body_contact,
     gripper_environment_contact,
+    upper_contact,
 )
 from tcs.kernel.problem import Problem
 from tcs.kernel.views import unowned
@@ -21,13 +21,13 @@ from tcs.kernel.workspace import Workspace
 
 @jit
 def base_is_free(owned_problem: Problem, owned_work: Workspace, configuration: int) -> bool:
-    """Return whether base, torso and the other arm touch nothing at a configuration."""
+    """Return whether the robot at rest touches nothing at a configuration."""
     problem, work = unowned(owned_problem), unowned(owned_work)
     torso = configuration % problem.torso_levels
     place_base(problem, work, configuration // problem.torso_levels)
     return (
         base_contact(problem, work, BASE_FIXED, BASE_FIXED) == NO_CONTACT
-        and base_contact(problem, work, torso, TORSO_MOUNTED) == NO_CONTACT
+        and upper_contact(problem, work, torso) == NO_CONTACT
     )
 
 

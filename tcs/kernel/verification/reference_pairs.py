@@ -150,6 +150,14 @@ class PlacedScene:
             for s, f in zip(shapes, self.scene.arm.frame, strict=True)
         ]
 
+    def touches_at_rest(self) -> bool:
+        """Return whether the arm touches the environment in all of its rest postures."""
+        scene = self.scene
+        return len(scene.rest) > 0 and all(
+            self.any_touch(self.arm_at(q), self.environment, scene.arm_vs_environment, scene.margin)
+            for q in scene.rest
+        )
+
     def gripper_touches(self, with_body: bool) -> bool:
         """Return whether the gripper at the goal touches the robot's body, or the environment."""
         X_A7 = compose(self.X_AG, inverse((self.scene.chain.R[7], self.scene.chain.p[7])))
@@ -185,7 +193,7 @@ def _column(shapes: list[PlacedShape], name: str) -> FloatArray:
 def placed_scene(
     scene: SceneArrays, grid: GridArrays, h: int, goal: int
 ) -> tuple[PlacedScene, bool]:
-    """Return the scene with the robot at configuration h, and whether its body is in contact."""
+    """Return the scene with the robot at configuration h, and whether it is in contact at rest."""
     shape = (
         grid.environment_states,
         len(grid.base_x),
@@ -207,7 +215,7 @@ def placed_scene(
     blocked = placed.any_touch(
         placed.body, placed.environment, scene.body_vs_environment, scene.margin
     )
-    return placed, blocked
+    return placed, blocked or placed.touches_at_rest()
 
 
 def score(

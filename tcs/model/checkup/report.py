@@ -249,8 +249,10 @@ def check_up(robot: RobotFile, *, samples: int = 1000, seed: int = 0) -> RobotCh
     arm = arm_class(arm_chain(scene)[0])
     positions = robot.with_mimics({**robot.joint_positions(), **robot.rest})
     rest = {name: positions[name] for name in robot.arm_joints}
-    scene.set_arm(list(rest.values()))
-    contacts = scene.violations()
+    contacts: dict[Contact, None] = {}
+    for posture in robot.rest_postures().values():
+        scene.set_arm(posture)
+        contacts |= dict.fromkeys(scene.violations())
     return RobotCheck(
         robot=robot,
         arm=arm,
@@ -259,7 +261,7 @@ def check_up(robot: RobotFile, *, samples: int = 1000, seed: int = 0) -> RobotCh
         rest=rest,
         margin=robot.self_margin,
         lowest=_lowest(robot, positions),
-        contacts=contacts,
+        contacts=tuple(contacts),
         trip=round_trip(scene, arm.solver, samples, seed),
         seed=seed,
         fingers_along=fingers_off_axis(robot),

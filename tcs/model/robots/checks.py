@@ -7,8 +7,9 @@ from collections.abc import Iterable, Mapping
 
 from tcs.errors import RobotError, UnknownNameError
 from tcs.model.robots.primitives import Primitive
-from tcs.model.robots.robot_file import RobotFile
+from tcs.model.robots.robot_file import REST, RobotFile
 from tcs.model.robots.urdf import WORLD, Joint, Urdf
+from tcs.model.robots.urdf.model import DRIVE
 
 
 def check_robot(robot: RobotFile, where: str) -> None:
@@ -39,7 +40,7 @@ def check_robot(robot: RobotFile, where: str) -> None:
                 "prismatic."
             )
     _check_ranges(robot, model, where)
-    _check_rest(robot, model, f"{where}, field 'rest'")
+    _check_rest(robot, model, where)
     _check_rates(robot, where)
     for field, choices in (("postures", robot.postures), ("grippers", robot.grippers)):
         for name, positions in choices.items():
@@ -187,10 +188,20 @@ def _check_known_joint(name: str, robot: RobotFile, where: str) -> None:
 
 
 def _check_rest(robot: RobotFile, model: Urdf, where: str) -> None:
-    """Check that a rest posture has only joints of the arm, within hard limits."""
-    for name, value in robot.rest.items():
-        _check_known_joint(name, robot, where)
-        _check_within(model.joints[name], value, where)
+    """Check that rest postures have only joints of the arm, within hard limits."""
+    if REST in robot.other_rests:
+        raise RobotError(
+            f"{where}, field 'other_rests': '{REST}' is the name of the first one. Choose another."
+        )
+    drives = robot.mount is not None and robot.mount.drive is not None
+    others = {f"other_rests', '{name}": rest for name, rest in robot.other_rests.items()}
+    for field, posture in {REST: robot.rest, **others}.items():
+        at = f"{where}, field '{field}'"
+        for name, value in posture.items():
+            _check_known_joint(name, robot, at)
+            _check_within(model.joints[name], value, at)
+            if drives and name == DRIVE and value != 0.0:
+                raise RobotError(f"{at}: '{name}' is {value:g}, but must be 0 at a stop.")
 
 
 def _check_rates(robot: RobotFile, where: str) -> None:

@@ -29,6 +29,8 @@ Rate = Annotated[float, Field(gt=0.0, le=1000.0)]
 LEAST_JERK, MOST_JERK = 0.1, 1e5
 """Range of jerk limits [rad/s^3]: an arm takes 40 s to its acceleration at the least one."""
 Jerk = Annotated[float, Field(ge=LEAST_JERK, le=MOST_JERK)]
+REST = "rest"
+"""Name of the first rest posture."""
 ACCELERATION = 2.0
 """Acceleration limit of a joint unless the robot file gives one [rad/s^2]: URDFs have none, and
 this brings an arm to 1 rad/s in half a second, which suits motions next to a person."""
@@ -127,6 +129,9 @@ class RobotFile(Document):
     rest: Mapping[Name, JointPosition] = {}
     """Rest posture of the scored arm [rad]; a joint that is left out is at 0, or at the limit
     nearest to 0."""
+    other_rests: Annotated[Mapping[Name, Positions], Entries] = {}
+    """Further rest postures by name, for stops where the arm touches something in the one before,
+    as `rest`."""
     velocity_limits: Annotated[Mapping[Name, Rate], Entries] = {}
     """Velocity limits of joints of the scored arm [rad/s]; those left out are of the URDF."""
     acceleration_limits: Annotated[Mapping[Name, Rate], Entries] = {}
@@ -239,14 +244,28 @@ class RobotFile(Document):
         return [self.jerk_limits.get(name, math.inf) for name in self.arm_joints]
 
     def arm_rest(self) -> list[float]:
-        """Return the rest posture of the scored arm within the limits in force [rad].
+        """Return the first rest posture of the scored arm within the limits in force [rad].
 
         Raises:
             RobotError: If the URDF cannot be used.
         """
-        limits = self.joint_limits()
-        rest = [(self.rest.get(name, 0.0), limits[name]) for name in self.arm_joints]
-        return [min(max(angle, lower), upper) for angle, (lower, upper) in rest]
+        return self.rest_postures()[REST]
+
+    def rest_postures(self) -> dict[str, list[float]]:
+        """Return the rest postures of the scored arm within the limits in force [rad], by name.
+
+        They are in the order in which they are tried at a stop; the first one is REST.
+
+        Raises:
+            RobotError: If the URDF cannot be used.
+        """
+        limits = [self.joint_limits()[name] for name in self.arm_joints]
+        found = {}
+        for name, given in {REST: self.rest, **self.other_rests}.items():
+            angles = [given.get(joint, 0.0) for joint in self.arm_joints]
+            both = zip(angles, limits, strict=True)
+            found[name] = [min(max(angle, lower), upper) for angle, (lower, upper) in both]
+        return found
 
     def urdf_path(self) -> Path:
         """Return the path of the URDF on this machine.

@@ -93,8 +93,12 @@ def _flat(item: object) -> Iterator[object]:
         # Scenes of revolute joints keep the digests that files were written with.
         absent = {"slides", "coupled"} | ({"joints"} if item.joints == 7 else set())
     if isinstance(item, SceneArrays):
-        # So do scenes without free goals, and without tables of distances.
-        counts = {"freedom": len(item.freedom), "distances": len(item.distances.corners)}
+        # So do scenes without free goals, tables of distances, and rest postures.
+        counts = {
+            "freedom": len(item.freedom),
+            "distances": len(item.distances.corners),
+            "rest": len(item.rest),
+        }
         absent = {name for name, count in counts.items() if not count}
     if isinstance(item, tuple):
         names = getattr(item, "_fields", ("",) * len(item))

@@ -105,6 +105,7 @@ def _lowered(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
         goal_p=_origins(goal_matrices),
         freedom=freedom_rows(task, chain, scene.spec.robot.name),
         distances=_distances(scene, robot_bodies),
+        rest=_rest(scene),
     )
     return LoweredScene(
         arrays=read_only(arrays),
@@ -121,6 +122,12 @@ def _lowered(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
         environment_bodies=environment_bodies,
         goals=() if task is None else tuple(f"{task.name} {i}" for i in range(len(task.goals))),
     )
+
+
+def _rest(scene: Scene) -> FloatArray:
+    """Return the rest postures of the arm as the kernel takes them [rad], shape (n, 7)."""
+    postures = np.array(list(scene.spec.robot.rest_postures().values()))
+    return np.column_stack([np.zeros((len(postures), JOINTS - postures.shape[1])), postures])
 
 
 def _distances(scene: Scene, bodies: tuple[str, ...]) -> BodyDistances:

@@ -303,6 +303,26 @@ class Scene:
             if contact[2] < self.required_clearance(contact[0], contact[1])
         )
 
+    def of_environment(self, contacts: Iterable[Contact]) -> tuple[Contact, ...]:
+        """Return those of some contacts that are with the environment."""
+        return tuple(contact for contact in contacts if contact[1] in self._of_environment)
+
+    def resting_arm(self) -> FloatArray:
+        """Return the posture in which the arm rests at the present state [rad]; it stays as it is.
+
+        It is the first rest posture of the robot file that is free of the environment, or the first
+        one where none is.
+        """
+        postures = [np.array(q) for q in self.spec.robot.rest_postures().values()]
+        before = self.positions()
+        for q in postures[: len(postures) if len(postures) > 1 else 0]:
+            self.set_arm(q)
+            touches = self.of_environment(self.violations())
+            self.restore(before)
+            if not touches:
+                return q
+        return postures[0]
+
     def _greatest_requirement(self) -> float:
         """Return the greatest distance that any checked pair of bodies must keep [m]."""
         of_robot = sorted(p for name, p in self._pads.items() if name not in self._of_environment)

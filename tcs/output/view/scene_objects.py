@@ -74,7 +74,6 @@ class SceneShapes:
         self._outline = base_outline(scene)
         self._robot = robot_shapes(scene, meshes)
         self._environment = _environment_shapes(scene)
-        self._rest = resting_arm(scene)
 
     def poses(
         self, at: InitialConfiguration, joints: ArrayLike | None, goal: int
@@ -91,7 +90,7 @@ class SceneShapes:
             scene.set_joint(name, value)
         scene.place_base(at.base_x, at.base_y, at.base_yaw)
         scene.set_torso(at.torso)
-        scene.set_arm(self._rest if joints is None else joints)
+        scene.set_arm(scene.resting_arm() if joints is None else joints)
         plant, context = scene.built.plant, scene.plant_context
         X_WB = scene.base_pose()
         poses = {ROBOT: X_WB}
@@ -245,14 +244,6 @@ def _environment_shapes(scene: Scene) -> list[BodyShape]:
         )
         for part, category in environment_parts(scene)
     ]
-
-
-def resting_arm(scene: Scene) -> FloatArray:
-    """Return the rest posture of the robot file [rad], within the joint limits."""
-    robot = scene.spec.robot
-    rest = np.array([robot.rest.get(name, 0.0) for name in robot.arm_joints])
-    lower, upper = scene.arm_limits
-    return np.asarray(np.clip(rest, lower, upper))
 
 
 def _arrow() -> tuple[FloatArray, NDArray[np.int32]]:

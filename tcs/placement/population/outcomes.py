@@ -20,7 +20,7 @@ from tcs.model.scene import PeopleInScene, SceneSpec
 from tcs.model.tasks import load_task
 from tcs.placement.population.kept_people import BLOCK, PROBES, KeptPeople
 from tcs.placement.population.problems import PersonProblems
-from tcs.placement.robustness.body_collisions import counted_pairs
+from tcs.placement.robustness.body_collisions import counted_pairs, counted_rests
 from tcs.placement.robustness.error_model import Offsets
 from tcs.placement.robustness.perturbed_scenes import BasePoses, PerturbedScenes, Run
 from tcs.placement.robustness.trials import ArmTrials, Progress, Trials
@@ -155,7 +155,7 @@ def _with_papers_man(arm: ArmTrials, trials: Trials) -> ArmTrials:
     scene = job.scene()
     lowered = job.lowered(scene)
     pairs = counted_pairs(scene, lowered, trials.body_collisions)
-    return ArmTrials(job, scene, lowered, pairs)
+    return ArmTrials(job, scene, counted_rests(lowered, trials.body_collisions), pairs)
 
 
 def _prepared(

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 from pydrake.multibody.tree import RevoluteJoint, WeldJoint
 
 from tcs.errors import UnknownNameError
@@ -9,7 +12,7 @@ from tcs.kernel.arrays import BoolArray
 from tcs.model.scene import LoweredScene, Scene
 
 BODY_COLLISIONS = ("paper", "all", "none")
-"""Collisions of the robot's body, i.e. of everything but the scored arm, with the environment:
+"""Collisions of the robot at rest, its body and the scored arm, with the environment:
 
 - `paper`: all but those of the base with the furniture, which the evaluation of the TCS paper
   ignores: the base may touch a wheelchair that stands elsewhere than assumed.
@@ -54,6 +57,13 @@ def counted_pairs(scene: Scene, lowered: LoweredScene, body_collisions: str) -> 
             if not spec.is_person(model):
                 pairs[of_base, column] = False
     return pairs
+
+
+def counted_rests(lowered: LoweredScene, body_collisions: str) -> LoweredScene:
+    """Return a scene whose arm at rest is checked only if collisions of the body count at all."""
+    if body_collisions != "none":
+        return lowered
+    return replace(lowered, arrays=lowered.arrays._replace(rest=np.empty((0, 7))))
 
 
 def base_bodies(scene: Scene) -> frozenset[str]:

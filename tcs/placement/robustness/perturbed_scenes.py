@@ -69,6 +69,8 @@ class PerturbedScenes(NamedTuple):
             body=problem.body[only],
             body_A=problem.body_A[only],
             body_spheres=problem.body_spheres[only],
+            rest=problem.rest[only],
+            rest_spheres=problem.rest_spheres[only],
             torso_levels=1,
         )
 

@@ -21,7 +21,11 @@ from tcs.kernel.scores import Scores
 from tcs.kernel.sweep import gripper_contacts
 from tcs.model.grid import Grid
 from tcs.model.scene import ErrorDistribution, LoweredScene, Scene, environment_at
-from tcs.placement.robustness.body_collisions import check_body_collisions, counted_pairs
+from tcs.placement.robustness.body_collisions import (
+    check_body_collisions,
+    counted_pairs,
+    counted_rests,
+)
 from tcs.placement.robustness.displacements import displaced, samples_of
 from tcs.placement.robustness.error_model import ErrorModel, Offsets
 from tcs.placement.robustness.kept_runs import kept_runs, states_digest, trials_key
@@ -182,7 +186,7 @@ class Trials:
             ArmTrials(
                 job,
                 scene,
-                lowered,
+                counted_rests(lowered, body_collisions),
                 counted_pairs(scene, lowered, body_collisions),
                 approach_lines(job) if APPROACH in file.metadata else None,
             )

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.kernel.verification.reference import measured, prescribed
-from tcs.model.scene import NeighbourList, Scene, arm_chain, axis_of_turn, goal_poses
+from tcs.model.scene import Contact, NeighbourList, Scene, arm_chain, axis_of_turn, goal_poses
 from tcs.placement.scoring.job import Job
 
 POSITION_BAR = 1e-6
@@ -41,7 +41,7 @@ class Finding:
     limit_violations: int
     """Number of joints beyond their limits."""
     contacts: int
-    """Number of pairs of bodies closer than required."""
+    """Number of pairs of bodies closer than required, in the posture at the goal and at rest."""
 
     @property
     def is_true(self) -> bool:
@@ -119,11 +119,7 @@ class DrakeChecker:
         if free is not None:
             X_GT = X_TG.inverse()
             position, rotation = free.errors(X_GT.rotation().matrix(), X_GT.translation())
-        contacts = [
-            distance
-            for first, second, distance in self._neighbours.violations()
-            if distance < scene.required_clearance(first, second) - CLEARANCE_ROUNDING
-        ]
+        contacts = self._contacts()
         J = scene.tool_jacobian()
         if self._turn is not None:
             J = prescribed(J, X_WT.rotation().matrix() @ self._turn)
@@ -134,8 +130,27 @@ class DrakeChecker:
             dexterity=exact,
             dexterity_error=abs(exact - float(value)),
             limit_violations=int(np.sum((q < self._lower) | (q > self._upper))),
-            contacts=len(contacts),
+            contacts=len(contacts) + self._contacts_at_rest(),
         )
+
+    def _contacts(self) -> list[Contact]:
+        """Return the contacts in the present state, those of rounding left out."""
+        return [
+            (first, second, distance)
+            for first, second, distance in self._neighbours.violations()
+            if distance < self._scene.required_clearance(first, second) - CLEARANCE_ROUNDING
+        ]
+
+    def _contacts_at_rest(self) -> int:
+        """Return the fewest contacts with the environment in a rest posture; moves the arm."""
+        least = None
+        for q in self._scene.spec.robot.rest_postures().values():
+            self._scene.set_arm(q)
+            count = len(self._scene.of_environment(self._contacts()))
+            least = count if least is None else min(least, count)
+            if not least:
+                break
+        return least or 0
 
 
 def _axis_of_turn(job: Job, scene: Scene) -> NDArray[np.float64] | None:

@@ -5,6 +5,7 @@ the proof that primitives enclose the meshes in fitting/test_enclosure.py, and a
 tests/placement/scoring/test_robots.py; all of them run over every robot as well.
 """
 
+import itertools
 import re
 from pathlib import Path
 
@@ -93,16 +94,21 @@ def test_kinematics_agree_with_drake(robot, model):
         np.testing.assert_allclose(p, X_BT.translation(), atol=1e-12)
 
 
-def test_rest_is_free_of_self_collision(robot, model):
+def test_rest_is_free_of_self_collision_at_every_torso_height(robot, model):
     moved, hand = (model.links_moved_by(robot.arm_joints[i]) for i in (0, -1))
     disabled = {frozenset(pair) for pair in robot.disabled_pairs}
-    rest = robot.with_mimics({**robot.joint_positions(), **robot.rest})
-    touching = {
-        pair
-        for pair in SelfCollision(robot).touching(rest)
-        if moved & set(pair) and not set(pair) <= hand and frozenset(pair) not in disabled
-    }
-    assert touching == set()
+    torso = robot.torso_joint
+    heights = [{}] if torso is None else [{torso: z} for z in robot.joint_limits()[torso]]
+    judge = SelfCollision(robot)
+    for (name, posture), height in itertools.product(robot.rest_postures().items(), heights):
+        given = dict(zip(robot.arm_joints, posture, strict=True))
+        rest = robot.with_mimics({**robot.joint_positions(), **given, **height})
+        touching = {
+            pair
+            for pair in judge.touching(rest)
+            if moved & set(pair) and not set(pair) <= hand and frozenset(pair) not in disabled
+        }
+        assert touching == set(), (name, height)
 
 
 def test_the_x_axis_of_the_tool_points_out_of_the_hand(robot, model):

@@ -28,7 +28,12 @@ from tcs.model.scene import (
 from tcs.model.scene.contacts import Group
 from tcs.placement.robustness import PerturbedPoints, Trials, perturbed_scenes
 from tcs.placement.robustness import trials as trials_module
-from tcs.placement.robustness.body_collisions import BODY_COLLISIONS, base_bodies, counted_pairs
+from tcs.placement.robustness.body_collisions import (
+    BODY_COLLISIONS,
+    base_bodies,
+    counted_pairs,
+    counted_rests,
+)
 from tcs.placement.scoring.drake_check import CLEARANCE_ROUNDING, POSITION_BAR, ROTATION_BAR
 from tcs.placement.tables import Points, Reason
 from tests.kernel.judge import is_true
@@ -282,6 +287,9 @@ def test_body_collisions_decide_by_base_and_person(chair_file, chair_trials):
     }
     assert np.array_equal(checked["all"], arrays.body_vs_environment)
     assert not checked["none"].any()
+    rests = {choice: counted_rests(lowered, choice).arrays.rest for choice in BODY_COLLISIONS}
+    assert len(rests["all"]) == len(rests["paper"]) == len(arrays.rest) > 0
+    assert not len(rests["none"])
     names = np.array(lowered.robot_bodies)[arrays.body.body]
     models = np.array([name.split("::")[0] for name in lowered.environment_bodies])
     of_base = names == "base_link"
