@@ -16,13 +16,16 @@ BoolArray = NDArray[np.bool_]
 
 
 def blocked_bodies(obstacle: Obstacle, postures: Postures) -> BoolArray:
-    """Return which candidates' bodies touch an obstacle, shape (C,).
+    """Return at which candidates the robot at rest touches an obstacle, shape (C,).
+
+    With several rest postures, the arm must be free in each: which of them are free of what was
+    scored is not stored.
 
     Args:
         obstacle: The obstacle.
         postures: The robot at the candidates.
     """
-    shapes, body = postures.shapes, postures.shapes.body
+    shapes, body = postures.shapes, postures.shapes.at_stop
     first, inverse = postures.body_poses
     bound = body.bound + body.pad
     reach = float(np.max(np.linalg.norm(body.p[:, :2], axis=1) + bound, initial=0.0))

@@ -102,23 +102,5 @@ class Postures:
 
     @cached_property
     def link_poses(self) -> tuple[FloatArray, FloatArray]:
-        """Poses of the arm's links in B in each solution, (R, 7, 3, 3) and (R, 7, 3)."""
-        shapes, q = self.shapes, self.joints
-        R = np.broadcast_to(shapes.arm_base_R, (len(q), 3, 3))
-        p = shapes.arm_base_p + shapes.torso_shift[self.level[self.pairs[0]]]
-        links_R, links_p = np.empty((len(q), 7, 3, 3)), np.empty((len(q), 7, 3))
-        for joint in range(7):
-            p = p + R @ shapes.chain_p[joint]
-            R = R @ shapes.chain_R[joint] @ _rotation_z(q[:, joint])
-            links_R[:, joint], links_p[:, joint] = R, p
-        return links_R, links_p
-
-
-def _rotation_z(angle: FloatArray) -> FloatArray:
-    """Return rotations about z, shape (m, 3, 3)."""
-    R = np.zeros((len(angle), 3, 3))
-    R[:, 0, 0] = R[:, 1, 1] = np.cos(angle)
-    R[:, 1, 0] = np.sin(angle)
-    R[:, 0, 1] = -R[:, 1, 0]
-    R[:, 2, 2] = 1.0
-    return R
+        """Poses of the arm's links in B in each solution, (R, links, 3, 3) and (R, links, 3)."""
+        return self.shapes.link_poses(self.joints, self.level[self.pairs[0]])

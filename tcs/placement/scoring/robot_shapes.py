@@ -34,6 +34,9 @@ def robot_shapes(arrays: SceneArrays) -> RobotShapes | None:
         arm=_primitives(arrays.arm),
         body=_primitives(arrays.body),
         margin=float(arrays.margin),
+        slides=arrays.chain.slides,
+        coupled=arrays.chain.coupled,
+        rest=arrays.rest,
     )
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -54,7 +55,7 @@ class Primitives:
         return np.where(self.type == BOX, np.linalg.norm(self.size, axis=1), capsule)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class RobotShapes:
     """The robot at torso level 0, as lowered from the Drake plant that was scored.
 
@@ -78,11 +79,60 @@ class RobotShapes:
     """All other shapes, in B."""
     margin: float
     """Least clearance [m]: shapes closer than this collide."""
+    slides: FloatArray = field(default_factory=lambda: np.zeros(ARM_JOINTS))
+    """Motion of each prismatic joint per unit [m/m], 0 for a revolute joint, shape (7,)."""
+    coupled: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    """Links between coupled joints, which carry shapes as links 8 and up: index of their joint, and
+    the fraction of its motion that the link makes, shape (n, 2)."""
+    rest: FloatArray = field(default_factory=lambda: np.zeros((0, ARM_JOINTS)))
+    """Rest postures of the arm [rad], shape (n, 7)."""
+
+    @cached_property
+    def at_stop(self) -> Primitives:
+        """The shapes in B at a stop: those of the body, and the arm's in each rest posture."""
+        parts = [self.body]
+        level = np.zeros(1, dtype=np.int64)
+        for q in self.rest:
+            links_R, links_p = (poses[0] for poses in self.link_poses(q[None], level))
+            R, link = links_R[self.arm.frame - 1], self.arm.frame - 1
+            p = links_p[link] + np.einsum("nij,nj->ni", R, self.arm.p)
+            parts.append(replace(self.arm, frame=np.ones_like(link), R=R @ self.arm.R, p=p))
+        return Primitives(
+            **{name: np.concatenate([getattr(one, name) for one in parts]) for name in _COLUMNS}
+        )
+
+    def link_poses(self, q: FloatArray, level: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return the poses of the arm's links in B.
+
+        Args:
+            q: Arm joints [rad], shape (n, 7).
+            level: Torso levels, shape (n,).
+
+        Returns:
+            Shapes (n, links, 3, 3) and (n, links, 3): links 1 to 7, then the coupled ones.
+        """
+        links = ARM_JOINTS + len(self.coupled)
+        R = np.broadcast_to(self.arm_base_R, (len(q), 3, 3))
+        p = self.arm_base_p + self.torso_shift[level]
+        links_R, links_p = np.empty((len(q), links, 3, 3)), np.empty((len(q), links, 3))
+        for joint in range(ARM_JOINTS):
+            p, R = p + R @ self.chain_p[joint], R @ self.chain_R[joint]
+            if self.slides[joint]:
+                p = p + self.slides[joint] * q[:, joint, None] * R[:, :, 2]
+            else:
+                R = R @ _rotation_z(q[:, joint])
+            links_R[:, joint], links_p[:, joint] = R, p
+        for i, (of, fraction) in enumerate(self.coupled, ARM_JOINTS):
+            joint = int(of)
+            back = (1.0 - fraction) * self.slides[joint] * q[:, joint, None]
+            links_R[:, i] = links_R[:, joint]
+            links_p[:, i] = links_p[:, joint] - back * links_R[:, joint, :, 2]
+        return links_R, links_p
 
     def to_dict(self) -> dict[str, Any]:
         """Return the shapes as plain containers, for the metadata of a score file."""
         return {
-            **{name: getattr(self, name).ravel().tolist() for name in _ARRAYS},
+            **{name: getattr(self, name).ravel().tolist() for name in (*_ARRAYS, *_ADDED)},
             **{
                 part: {
                     name: getattr(getattr(self, part), name).ravel().tolist() for name in _COLUMNS
@@ -104,10 +154,17 @@ class RobotShapes:
         margin = plain.get("margin")
         if not isinstance(margin, float) or not 0.0 <= margin < math.inf:
             raise StoreError(f"{_WHERE}: margin must be a number >= 0.")
-        arrays = {name: _array(plain, name, shape) for name, shape in _ARRAYS.items()}
+        given = _ARRAYS | {name: shape for name, shape in _ADDED.items() if name in plain}
+        arrays = {name: _array(plain, name, shape) for name, shape in given.items()}
         arm, body = (_primitives(plain.get(part)) for part in ("arm", "body"))
-        if np.any((arm.frame < 1) | (arm.frame > ARM_JOINTS)) or np.any(body.frame >> 1):
+        coupled = arrays.get("coupled", np.zeros((0, 2)))
+        links = ARM_JOINTS + len(coupled)
+        if np.any((arm.frame < 1) | (arm.frame > links)) or np.any(body.frame >> 1):
             raise StoreError(f"{_WHERE}: a shape is on a part that the robot does not have.")
+        if np.any((coupled[:, 0] < 0) | (coupled[:, 0] >= ARM_JOINTS)):
+            raise StoreError(
+                f"{_WHERE}: a link is coupled to a joint that the robot does not have."
+            )
         return cls(**arrays, arm=arm, body=body, margin=margin)
 
 
@@ -118,6 +175,8 @@ _ARRAYS = {
     "arm_base_p": (3,),
     "torso_shift": (-1, 3),
 }
+_ADDED = {"slides": (ARM_JOINTS,), "coupled": (-1, 2), "rest": (-1, ARM_JOINTS)}
+"""Arrays that files of earlier versions do not have."""
 _COLUMNS = {"type": (-1,), "size": (-1, 3), "pad": (-1,), "frame": (-1,), "R": (-1, 3, 3)} | {
     "p": (-1, 3)
 }
@@ -151,3 +210,13 @@ def _array(plain: Mapping[str, object], name: str, shape: tuple[int, ...]) -> Fl
     ):
         raise StoreError(f"{_WHERE}: '{name}' must be a list of finite numbers of shape {shape}.")
     return np.array(values, dtype=np.float64).reshape(shape)
+
+
+def _rotation_z(angle: FloatArray) -> FloatArray:
+    """Return rotations about z, shape (m, 3, 3)."""
+    R = np.zeros((len(angle), 3, 3))
+    R[:, 0, 0] = R[:, 1, 1] = np.cos(angle)
+    R[:, 1, 0] = np.sin(angle)
+    R[:, 0, 1] = -R[:, 1, 0]
+    R[:, 2, 2] = 1.0
+    return R

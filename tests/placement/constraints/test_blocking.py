@@ -4,11 +4,14 @@ import numpy as np
 import pytest
 
 from tcs.model.scene import EnvironmentFile, Scene
+from tcs.model.scene.contacts import Group
 from tcs.model.scene.spec import SceneSpec
 from tcs.placement.constraints import Obstacle
 from tcs.placement.constraints.blocking import blocked_bodies, blocked_solutions
 from tcs.placement.scoring import load_job, score
+from tcs.placement.scoring.robot_shapes import robot_shapes
 from tcs.placement.selection import SelectionTables
+from tcs.placement.store.robot_shapes import RobotShapes
 from tests.environments import CORNER, write_environment
 
 OBSTACLES = (
@@ -48,22 +51,31 @@ def test_obstacles_block_what_drake_finds_in_contact(corner, drake):
     file, job = corner
     tables = SelectionTables.of(file)
     postures = tables.postures
+    pairs = postures.pairs
     bodies = np.stack([blocked_bodies(obstacle, postures) for obstacle in OBSTACLES])
     everyone = np.ones(len(tables.sets.candidates), dtype=np.bool_)
     arms = np.stack([blocked_solutions(obstacle, postures, everyone) for obstacle in OBSTACLES])
     margin = job.spec.environment.contact_margin
+    at_rest = {}
     arm_names = {part.name for part in drake.built.parts if part.group.name == "ARM"}
-    for pair, (candidate, goal) in enumerate(zip(*postures.pairs, strict=True)):
+    for pair, (candidate, goal) in enumerate(zip(*pairs, strict=True)):
         h = int(tables.sets.candidates[candidate])
         here = job.grid.configuration(h)
         drake.place_base(here.base_x, here.base_y, here.base_yaw)
         drake.set_torso(here.torso)
-        drake.set_arm(file.nominal.scores.joints_of(h, int(goal)))
-        least = {}
-        for robot, other, distance in drake.clearances(0.1):
-            if other.startswith("seen_"):
-                key = (robot in arm_names, int(other.removeprefix("seen_")))
-                least[key] = min(distance, least.get(key, np.inf))
+        # At the goal the arm counts, at rest the whole robot.
+        tried = [(True, file.nominal.scores.joints_of(h, int(goal)))]
+        if candidate not in at_rest:
+            at_rest[candidate] = {}
+            tried += [(False, rest) for rest in job.spec.robot.rest_postures().values()]
+        least = dict(at_rest[candidate])
+        for is_arm, q in tried:
+            drake.set_arm(q)
+            for robot, other, distance in drake.clearances(0.06):
+                if other.startswith("seen_") and (robot in arm_names or not is_arm):
+                    key = (is_arm, int(other.removeprefix("seen_")))
+                    least[key] = min(distance, least.get(key, np.inf))
+        at_rest[candidate] = {key: d for key, d in least.items() if not key[0]}
         for i in range(len(OBSTACLES)):
             for is_arm, found in ((True, arms[i, pair]), (False, bodies[i, candidate])):
                 distance = least.get((is_arm, i), np.inf)
@@ -86,3 +98,22 @@ def test_the_stored_shapes_hold_at_every_torso_level(corner):
             shapes.body.p + mounted * shapes.torso_shift[level], arrays.body.p[level], atol=1e-9
         )
     assert shapes.torso_shift[:, 2].tolist() == pytest.approx([0.0, 0.15])
+
+
+def test_the_stored_shapes_of_an_arm_that_drives_and_slides_are_where_drake_has_them(rng):
+    job = load_job("feeding", "wheelchair", "stretch")
+    scene = job.scene()
+    shapes = RobotShapes.from_dict(robot_shapes(job.lowered(scene).arrays).to_dict())
+    lower, upper = scene.arm_limits
+    q = rng.uniform(lower, upper)
+    scene.place_base(0.0, 0.0, 0.0)
+    scene.set_arm(q)
+    parts = [part for part in scene.built.parts if part.group is Group.ARM]
+    links_R, links_p = shapes.link_poses(np.append(0.0, q)[None], np.zeros(1, dtype=np.int64))
+    assert {part.carrier for part in parts} > {2, 7, 8}
+    for i, part in enumerate(parts):
+        X_WG, link = scene.shape_pose(part), shapes.arm.frame[i] - 1
+        p = links_p[0, link] + links_R[0, link] @ shapes.arm.p[i]
+        np.testing.assert_allclose(p, X_WG.translation(), atol=1e-9)
+        R = links_R[0, link] @ shapes.arm.R[i]
+        np.testing.assert_allclose(R, X_WG.rotation().matrix(), atol=1e-9)
