@@ -58,7 +58,8 @@ def test_obstacles_block_what_drake_finds_in_contact(corner, drake):
     margin = job.spec.environment.contact_margin
     at_rest = {}
     arm_names = {part.name for part in drake.built.parts if part.group.name == "ARM"}
-    for pair, (candidate, goal) in enumerate(zip(*pairs, strict=True)):
+    for pair in range(0, len(pairs[0]), 3):
+        candidate, goal = (int(numbers[pair]) for numbers in pairs)
         h = int(tables.sets.candidates[candidate])
         here = job.grid.configuration(h)
         drake.place_base(here.base_x, here.base_y, here.base_yaw)
