@@ -59,8 +59,9 @@ def test_what_counts_is_free_at_rest_and_what_is_refused_is_not(robot, rng):
 def test_verify_refutes_a_stop_where_the_arm_at_rest_is_in_contact(tmp_path, monkeypatch):
     environment = write_environment(tmp_path, "beside", BESIDE)
     monkeypatch.setattr(lowering, "_rest", lambda scene: np.empty((0, 7)))
-    # The arm at rest reaches into the person.
-    job = load_job("shaving", environment, "pr2")
-    robot = job.spec.robot.model_copy(update={"rest": {}, "other_rests": {}})
+    robot = tmp_path / "reaching.yaml"
+    # Straight ahead, into person and chair.
+    rests = "rest: {l_elbow_flex_joint: -0.15}\nother_rests: {}\n"
+    robot.write_text("based_on: pr2\nname: reaching\ntitle: reaching\n" + rests)
     file = score("shaving", environment, robot, approach=False)
-    assert verify(file, pairs=6, dense=0).false_reached > 0
+    assert verify(file, pairs=8, dense=0).false_reached > 0
