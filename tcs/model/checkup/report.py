@@ -174,10 +174,11 @@ class RobotCheck:
                 f"nothing is checked against {', '.join(self.robot.ignored_links)} "
                 "('ignored_links' of the robot file)."
             )
-        if self.robot.surfaces == "collision":
+        if self.robot.surfaces != "all":
+            other = "visual" if self.robot.surfaces == "collision" else "collision"
             found.append(
-                "surfaces: collision, so parts of the visual meshes may protrude from the "
-                "primitives unchecked."
+                f"surfaces: {self.robot.surfaces}, so parts of the {other} meshes may protrude "
+                "from the primitives unchecked."
             )
         if self.robot.limits == "soft" and all(j.soft == j.hard for j in self.limits):
             found.append(

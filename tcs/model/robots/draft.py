@@ -35,6 +35,7 @@ from tcs.model.robots.self_collision import (
 )
 from tcs.model.robots.tool_place import tool_place
 from tcs.model.robots.urdf import Joint, Urdf, read_urdf
+from tcs.model.robots.urdf.model import SurfacesOf
 from tcs.model.robots.urdf.packages import resolve_uri
 from tcs.model.robots.urdf.pose import pose_in_root
 from tcs.model.robots.urdf.surfaces import body_triangles
@@ -127,7 +128,8 @@ def draft_robot(
         if link not in model.links:
             where = f"URDF '{path}', links to ignore"
             raise UnknownNameError("link", link, model.links, where=where)
-    model = model.with_surfaces(collision_only=options.collision_meshes, ignored=options.ignore)
+    surfaces: SurfacesOf = "collision" if options.collision_meshes else "all"
+    model = model.with_surfaces(of=surfaces, ignored=options.ignore)
     model.require_surfaces()
     if not body_triangles(model):
         raise RobotError(
@@ -144,7 +146,7 @@ def draft_robot(
             name=name or path.stem,
             title=f"{path.stem}, tool {tool}",
             urdf=address,
-            surfaces="collision" if options.collision_meshes else "all",
+            surfaces=surfaces,
             ignored_links=options.ignore,
             packages=options.packages,
             root_body=model.root,

@@ -15,7 +15,7 @@ from tcs.files.documents import Clearance, Document, Entries, JointPosition, Pla
 from tcs.files.unchanged import kept_while_unchanged
 from tcs.model.robots.primitives import Primitive, quaternion_of_rpy, read_primitives
 from tcs.model.robots.urdf import WORLD, Urdf, read_urdf
-from tcs.model.robots.urdf.model import Mimic
+from tcs.model.robots.urdf.model import Mimic, SurfacesOf
 from tcs.model.robots.urdf.packages import resolve_uri
 
 Name = Annotated[str, Field(min_length=1)]
@@ -111,8 +111,8 @@ class RobotFile(Document):
     mount: Mount | None = None
     """The link that carries the root link of a URDF that starts above the floor; None if it is on
     the floor."""
-    surfaces: Literal["all", "collision"] = "all"
-    """What the primitives of a link enclose: its visual and its collision geometry, or the latter
+    surfaces: SurfacesOf = "all"
+    """What the primitives of a link enclose: its visual and its collision geometry, or one of both
     alone if the URDF has any for it."""
     ignored_links: tuple[Name, ...] = ()
     """Links that nothing is checked against: they have no primitives."""
@@ -281,11 +281,10 @@ class RobotFile(Document):
         Raises:
             RobotError: If the URDF cannot be used.
         """
-        collision_only = self.surfaces == "collision"
         coupled = tuple(self.coupled.items())
         folders = self.packages
         return _model(
-            self.urdf_path(), folders, self.mount, collision_only, self.ignored_links, coupled
+            self.urdf_path(), folders, self.mount, self.surfaces, self.ignored_links, coupled
         )
 
     def joint_limits(self) -> dict[str, tuple[float, float]]:
@@ -395,7 +394,7 @@ def _model(
     path: Path,
     folders: tuple[str, ...],
     mount: Mount | None,
-    collision_only: bool,
+    surfaces: SurfacesOf,
     ignored: tuple[str, ...],
     coupled: tuple[tuple[str, str], ...],
 ) -> Urdf:
@@ -411,8 +410,8 @@ def _model(
         follower = model.joint(name, "field 'coupled'")
         joint = replace(follower, mimic=Mimic(leader=leader, multiplier=1.0, offset=0.0))
         model = Urdf(path=path, links=model.links, joints={**model.joints, name: joint})
-    if collision_only or ignored:
-        model = model.with_surfaces(collision_only=collision_only, ignored=ignored)
+    if surfaces != "all" or ignored:
+        model = model.with_surfaces(of=surfaces, ignored=ignored)
     model.require_surfaces()
     if mount is None:
         return model

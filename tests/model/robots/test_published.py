@@ -17,7 +17,7 @@ from tcs.model.robots.self_collision import SelfCollision, sample_positions
 from tcs.model.robots.urdf import Joint
 from tcs.model.robots.urdf.packages import resolve_uri
 from tcs.model.robots.urdf.pose import pose_in_root
-from tcs.model.robots.urdf.surfaces import body_triangles
+from tcs.model.robots.urdf.surfaces import body_triangles, geometry_triangles, place
 
 FOLDER = data_folder() / "models" / "robots"
 BAXTER = "package://example-robot-data/robots/baxter_description/urdf/baxter.urdf"
@@ -277,20 +277,34 @@ def test_pandas_wrist_keeps_its_range_because_the_hand_is_checked_against_the_fo
     assert not touching[-5:].any()
 
 
-@pytest.mark.parametrize(
-    ("pair", "near", "beyond"),
-    [(("laser", "link_lift"), 0.041, 0.03), (("link_head", "link_lift"), 1.076, 1.09)],
-)
-def test_the_lift_of_stretch_crosses_base_and_head_only_beyond_its_range(pair, near, beyond):
+def test_the_lift_of_stretch_comes_near_the_head_only_beyond_its_range():
+    """It moves straight up, and is nearest at the end."""
     robot = load_robot("stretch")
-    assert pair in robot.disabled_pairs
-    lift = robot.joint_limits()["joint_lift"]
-    assert lift != robot.without_ranges.joint_limits()["joint_lift"]
-    postures = [{"joint_lift": q} for q in (*lift, near, beyond)]
-    *within, close, out = mesh_distances(robot, pair, postures)
+    pairs = [("link_head", "link_lift"), ("link_lift", "respeaker_base")]
+    assert set(pairs) <= set(robot.disabled_pairs)
+    lower, upper = robot.joint_limits()["joint_lift"]
+    _, end = robot.without_ranges.joint_limits()["joint_lift"]
+    postures = [{"joint_lift": q} for q in (*np.linspace(lower, upper, 9), end)]
+    for pair in pairs:
+        assert mesh_distances(robot, pair, postures)[:-1].min() > robot.self_margin
     # The widest range to a millimetre.
-    assert min(within) > robot.self_margin > close
-    assert out <= 0.0
+    assert end - upper == pytest.approx(0.001)
+    assert mesh_distances(robot, pairs[0], postures)[-1] < robot.self_margin
+
+
+def test_shapes_of_stretch_are_as_large_as_the_parts_that_are_drawn():
+    """Its collision meshes are boxes that exceed base and telescope by 8 and 10 mm."""
+    robot = load_robot("stretch")
+    shapes = robot.load_primitives()
+    for body in ("base_link", *(f"link_arm_l{i}" for i in range(1, 5))):
+        drawn = [g for g in robot.model().links[body] if g.role == "visual"]
+        corners = np.concatenate(
+            [place(geometry_triangles(g), g.xyz, g.rpy) for g in drawn]
+        ).reshape(-1, 3)
+        bounds = np.array([shape.bounds for shape in shapes if shape.body == body])
+        # Across: the protrusion to which the base is fitted.
+        assert np.all((bounds[:, 0].min(axis=0) > corners.min(axis=0) - 0.005)[:2])
+        assert np.all((bounds[:, 1].max(axis=0) < corners.max(axis=0) + 0.005)[:2])
 
 
 def test_the_wrist_of_jaco_folds_into_itself_only_beyond_its_range():

@@ -76,6 +76,10 @@ def fixed_joint(parent: str, child: str, xyz: Vector, rpy: Vector) -> Joint:
     )
 
 
+SurfacesOf = Literal["all", "visual", "collision"]
+"""What counts as the surface of a link: all its geometry, or one kind alone if it has any."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Geometry:
     """One visual or collision geometry of a link."""
@@ -132,18 +136,18 @@ class Urdf:
         links = {link: (), **self.links}
         return Urdf(path=self.path, links=links, joints={joint.name: joint, **self.joints})
 
-    def with_surfaces(self, *, collision_only: bool, ignored: Collection[str]) -> Urdf:
+    def with_surfaces(self, *, of: SurfacesOf, ignored: Collection[str]) -> Urdf:
         """Return the tree with fewer surfaces; what is left out is still drawn.
 
         Args:
-            collision_only: Whether the collision geometry of a link, if there is any, is its whole
-                surface.
+            of: Whether the visual or the collision geometry of a link, if there is any, is its
+                whole surface.
             ignored: Links without a surface.
         """
 
         def kept(link: str, geometry: Geometry) -> bool:
-            replaced = collision_only and any(g.role == "collision" for g in self.links[link])
-            return link not in ignored and not (replaced and geometry.role == "visual")
+            replaced = of != "all" and any(g.role == of for g in self.links[link])
+            return link not in ignored and not (replaced and geometry.role != of)
 
         links = {
             link: tuple(replace(g, is_surface=g.is_surface and kept(link, g)) for g in geometries)

@@ -265,13 +265,16 @@ def test_a_mesh_that_is_only_drawn_may_be_missing(tmp_path):
     model = read_urdf(path)
     with pytest.raises(RobotError, match=r"link 'b': 'gone\.dae': there is no file"):
         model.require_surfaces()
-    only = model.with_surfaces(collision_only=True, ignored=())
+    only = model.with_surfaces(of="collision", ignored=())
     only.require_surfaces()
     assert np.ptp(body_triangles(only)["b"], axis=(0, 1)).tolist() == [1.0, 1.0, 1.0]
     assert "gone" not in urdf_text(only, meshes=True)
     # Once it is there, it is found.
-    trimesh.creation.box().export(tmp_path / "gone.dae")
-    read_urdf(path).require_surfaces()
+    trimesh.creation.box([0.4, 0.4, 0.4]).export(tmp_path / "gone.dae")
+    found = read_urdf(path)
+    found.require_surfaces()
+    drawn = found.with_surfaces(of="visual", ignored=())
+    assert np.ptp(body_triangles(drawn)["b"], axis=(0, 1)).tolist() == pytest.approx([0.4] * 3)
 
 
 def test_a_link_of_20_m_is_refused(tmp_path):
