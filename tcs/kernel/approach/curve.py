@@ -129,30 +129,54 @@ def fill_spline(
     while True:
         if not _fill_points(arm, scene, grid, curve, b, offset, fastest, pieces, known):
             return False
-        points, tangents = curve.points[: pieces + 1], curve.tangents[: pieces + 1]
-        for n in range(pieces + 1):
-            for k in range(7):
-                tangents[n, k] = curve.slopes[n, k]
-        keep_within_limits(scene, points, tangents)
-        curve.pieces[0] = pieces
-        error = off = turned = 0.0
-        for n in range(pieces):
-            take_piece(motion, points, tangents, n)
-            error = error_between(scene, motion, curve.line, offset, (n + 0.5) / pieces)
-            if error > OFF_LINE:
-                break
-            at_middle = curve.line.newton.error
-            turned = max(turned, _length(at_middle[:3]))
-            off = max(off, _length(at_middle[3:]))
+        error = finish_spline(scene, motion, curve, offset, pieces)
         if error <= OFF_LINE:
-            slopes = curve.slopes[: pieces + 1]
-            take_line(scene, motion, offset, points, tangents, slopes, off, turned)
             return True
         if pieces == MOST:
             return False
         known = 4 if error > FAR_OFF * OFF_LINE and 4 * pieces <= MOST else 2
         pieces *= known
         _spread_points(curve, pieces, known)
+
+
+@inner
+def finish_spline(
+    scene: MotionScene,
+    motion: MotionWorkspace,
+    curve: CurveWorkspace,
+    offset: FloatArray,
+    pieces: int,
+) -> float:
+    """Make a spline of its points and slopes; return its greatest error [rad and m].
+
+    Above OFF_LINE, it is that of the first piece that is too far from the line.
+
+    Args:
+        scene: The scene.
+        motion: The spline is the line that its tool follows, unless it is too far from that.
+        curve: `points` and `slopes` are filled; so is the rest.
+        offset: Motion of the tool along the line, in A [m], shape (3,).
+        pieces: Number of pieces.
+    """
+    points, tangents = curve.points[: pieces + 1], curve.tangents[: pieces + 1]
+    for n in range(pieces + 1):
+        for k in range(7):
+            tangents[n, k] = curve.slopes[n, k]
+    keep_within_limits(scene, points, tangents)
+    curve.pieces[0] = pieces
+    worst = off = turned = 0.0
+    for n in range(pieces):
+        take_piece(motion, points, tangents, n)
+        error = error_between(scene, motion, curve.line, offset, (n + 0.5) / pieces)
+        if error > OFF_LINE:
+            return error
+        at_middle = curve.line.newton.error
+        worst = max(worst, error)
+        turned = max(turned, _length(at_middle[:3]))
+        off = max(off, _length(at_middle[3:]))
+    slopes = curve.slopes[: pieces + 1]
+    take_line(scene, motion, offset, points, tangents, slopes, off, turned)
+    return worst
 
 
 @inner
@@ -269,7 +293,7 @@ def _fill_points(
     for n in range(pieces + 1):
         fraction, q = n / pieces, points[n]
         if known > 0 and n % known == 0:
-            if n > 0 and _is_too_fast(points, n, pieces, fastest):
+            if n > 0 and is_too_fast(points, n, pieces, fastest):
                 return False
             continue
         for r in range(3):
@@ -282,7 +306,7 @@ def _fill_points(
                 if scene.period[k] > 0.0:
                     turns = np.floor((q[k] - points[n - 1, k]) / scene.period[k] + 0.5)
                     q[k] -= turns * scene.period[k]
-            if _is_too_fast(points, n, pieces, fastest):
+            if is_too_fast(points, n, pieces, fastest):
                 return False
         if evaluate_on_line(scene, line, q) > AT_POINT:
             return False
@@ -303,7 +327,7 @@ def _fill_points(
 
 
 @inner
-def _is_too_fast(points: FloatArray, n: int, pieces: int, fastest: FloatArray) -> bool:
+def is_too_fast(points: FloatArray, n: int, pieces: int, fastest: FloatArray) -> bool:
     """Return whether a joint moves too fast from the point before point n to that."""
     for k in range(7):
         if abs(points[n, k] - points[n - 1, k]) * pieces > fastest[k]:

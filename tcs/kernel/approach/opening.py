@@ -16,7 +16,7 @@ from tcs.kernel.approach.memory import Approach
 from tcs.kernel.cache import inner, int_constant
 from tcs.kernel.problem import Problem
 
-GOAL, ONE = int_constant(0), int_constant(1)
+GOAL, ONE, BEGIN = int_constant(0), int_constant(1), int_constant(PIECES)
 
 
 @inner
@@ -43,6 +43,13 @@ def open_goal(problem: Problem, approach: Approach, b: int, first: int, last: in
     _open_level(problem.arm, approach.search, grid, b, columns, GOAL, first, last)
     for i in range(columns):
         onward[i] = UNSEEN if is_open[i] else NOWHERE
+
+
+@inner
+def open_begin(problem: Problem, approach: Approach, b: int) -> bool:
+    """Fill the nodes of a branch at the begin of the line; return whether any is open."""
+    grid, columns = approach.grid, approach.columns[0]
+    return _open_level(problem.arm, approach.search, grid, b, columns, BEGIN, 0, columns - 1)
 
 
 @inner

@@ -19,12 +19,19 @@ from tcs.kernel.approach.grid import (
     place_fine_columns,
     place_levels,
 )
+from tcs.kernel.approach.lines import (
+    AT_GOAL,
+    lead_from,
+    lead_through_windows,
+    narrowest_level,
+)
 from tcs.kernel.approach.memory import ENOUGH, Approach
-from tcs.kernel.approach.opening import make_whole, open_branch, open_goal
+from tcs.kernel.approach.opening import make_whole, open_begin, open_branch, open_goal
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner
 from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.dexterity.measures import rounded_inward
+from tcs.kernel.kinematics import copy_joints
 from tcs.kernel.motion.straight import BLOCKED, DONE, LIMITS
 from tcs.kernel.problem import Problem
 from tcs.kernel.scores import APPROACH_BLOCKED, APPROACH_LIMITS, REACHED
@@ -85,11 +92,11 @@ def approach_pair(problem: Problem, approach: Approach, fastest: FloatArray, q: 
             return REACHED
         if approach.contact[0] == NO_CONTACT:
             if _search_narrow(problem, approach, fastest):
-                return _found_again(problem, approach, fastest)
-            if approach.contact[0] == NO_CONTACT:
-                return APPROACH_LIMITS
+                return REACHED
             break
-    return APPROACH_BLOCKED
+    if columns[4] != ENOUGH and _search_lines(problem, approach, fastest, q):
+        return REACHED
+    return APPROACH_LIMITS if approach.contact[0] == NO_CONTACT else APPROACH_BLOCKED
 
 
 @inner
@@ -136,6 +143,7 @@ def _search_narrow(problem: Problem, approach: Approach, fastest: FloatArray) ->
     first, step, column = grid.origin[0], grid.origin[1], columns[2]
     for b in range(len(arm.branches)):
         make_whole(problem, approach, b)
+    for b in range(len(arm.branches)):
         level = grid.deepest[b]
         if level == NOWHERE or (level == PIECES and b != columns[3]):
             continue
@@ -185,7 +193,7 @@ def _follow_narrow(
         if level < PIECES:
             slack = _greatest_slack(arm, approach, b, level + 1)
             if not _may_hide(slack, spacing):
-                break
+                return False
             if slack < 0.0:
                 low, high = _window(arm, approach, b, level)
         if low == NOWHERE:
@@ -193,13 +201,20 @@ def _follow_narrow(
                 for i in range(columns[0]):
                     grid.onward[other, 0, i] = NOWHERE
             if open_branch(problem, approach, b, 0, columns[0] - 1):
-                return follow_candidates(problem, approach, fastest)
+                if follow_candidates(problem, approach, fastest):
+                    if _is_found_again(problem, approach, fastest):
+                        return True
+                    _place_fine(arm, approach, fastest, angle, spacing)
+                break
             level = grid.deepest[b]
             if level == NOWHERE:
                 break
             low, high = grid.spans[b, level, 0], grid.spans[b, level, 1]
         angle = grid.origin[0] + 0.5 * (low + high) * spacing
-    return False
+    open_branch(problem, approach, b, 0, columns[0] - 1)
+    return grid.deepest[b] != NOWHERE and lead_through_windows(
+        problem, approach, fastest, b, narrowest_level(approach, b)
+    )
 
 
 @inner
@@ -209,16 +224,57 @@ def _may_hide(slack: float, spacing: float) -> bool:
 
 
 @inner
-def _found_again(problem: Problem, approach: Approach, fastest: FloatArray) -> int:
-    """Return REACHED if the line of a posture in a narrow window is found again from that alone.
+def _search_lines(problem: Problem, approach: Approach, fastest: FloatArray, q: FloatArray) -> bool:
+    """Follow lines of the shortest joint motion where limits or contacts leave a doubt.
 
-    It is the posture of `search.best`, as it is stored; APPROACH_LIMITS if its line is not found.
+    They are those through the posture that scoring found, through nodes of the narrowest level of
+    each branch, and through nodes at the begin: most of what is open there may lead into a window
+    at the goal that is narrower than the spacing of the columns, or into another branch.
+
+    Args:
+        problem: The scene.
+        approach: As for `approach_pair`; `search.best` is filled if a line is free.
+        fastest: As for `approach_pair`.
+        q: As for `approach_pair`.
+
+    Returns:
+        Whether a line is free.
+    """
+    arm, grid, columns, search = problem.arm, approach.grid, approach.columns, approach.search
+    copy_joints(q, search.q)
+    if lead_from(problem, approach, fastest, AT_GOAL) == DONE:
+        copy_joints(q, search.best)
+        return True
+    if grid.is_fine[0] or approach.contact[0] != NO_CONTACT:
+        columns[0] = place_columns(arm, grid, q[arm.free])
+        columns[1] = _most_columns(arm, grid, fastest)
+        for b in range(len(arm.branches)):
+            open_branch(problem, approach, b, 0, columns[0] - 1)
+    in_doubt = False
+    for b in range(len(arm.branches)):
+        level = grid.deepest[b]
+        if level == NOWHERE or (level < PIECES and not _may_hide(grid.slack[b], grid.origin[1])):
+            continue
+        in_doubt = True
+        if lead_through_windows(problem, approach, fastest, b, narrowest_level(approach, b)):
+            return True
+    for b in range(len(arm.branches) if in_doubt else 0):
+        if open_begin(problem, approach, b) and lead_through_windows(
+            problem, approach, fastest, b, PIECES
+        ):
+            return True
+    return False
+
+
+@inner
+def _is_found_again(problem: Problem, approach: Approach, fastest: FloatArray) -> bool:
+    """Return whether the line of the posture in `search.best` is found again from that as stored.
+
+    The grid is another one afterwards.
     """
     arm, search = problem.arm, approach.search
     rounded_inward(search.best, arm.lower, arm.upper, search.trial)
-    if follow_posture(problem, approach, fastest, search.trial) == DONE:
-        return REACHED
-    return APPROACH_LIMITS
+    return follow_posture(problem, approach, fastest, search.trial) == DONE
 
 
 @inner
@@ -303,6 +359,9 @@ def follow_posture(problem: Problem, approach: Approach, fastest: FloatArray, q:
         if level < PIECES:
             middle = 0.5 * (grid.spans[b, level, 0] + grid.spans[b, level, 1])
             centre = grid.origin[0] + middle * grid.origin[1]
+    if outcome != DONE:
+        copy_joints(q, approach.search.q)
+        outcome = lead_from(problem, approach, fastest, AT_GOAL)
     return outcome
 
 

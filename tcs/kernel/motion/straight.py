@@ -178,9 +178,9 @@ def _lead(
     for k in range(7):
         points[0, k], line.locked[k] = q[k], 0
     for n in range(last + 1):
-        if n > 0 and not _follow(scene, line, offset, n / last, points[n - 1], points[n]):
+        if n > 0 and not next_on_line(scene, line, offset, n / last, points[n - 1], points[n]):
             return LIMITS
-        if not _tangent(scene, line, offset, points[n], tangents[n]):
+        if not tangent_on_line(scene, line, offset, points[n], tangents[n]):
             return LIMITS
         for k in range(7):
             if abs(tangents[n, k]) > fastest[k]:
@@ -272,7 +272,7 @@ def evaluate_on_line(scene: MotionScene, line: StraightWorkspace, q: FloatArray)
 
 
 @inner
-def _follow(
+def next_on_line(
     scene: MotionScene,
     line: StraightWorkspace,
     offset: FloatArray,
@@ -323,7 +323,7 @@ def _follow(
 
 
 @inner
-def _tangent(
+def tangent_on_line(
     scene: MotionScene,
     line: StraightWorkspace,
     offset: FloatArray,

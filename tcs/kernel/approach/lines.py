@@ -1,0 +1,160 @@
+"""Lines that Newton's method follows, from postures on the way: where the grid finds none.
+
+The grid moves the free joint, and the closed form moves the others. Next to a straight wrist, where
+they turn fast against each other, and past the folds between branches, joints keep their limits
+along other lines: those of the shortest joint motion, whatever the free joint does, with a joint
+that arrives at its limit resting there. Through each posture leads one of them.
+"""
+
+from __future__ import annotations
+
+from tcs.kernel.analytic.ik import within
+from tcs.kernel.approach.curve import MOST, finish_spline, is_too_fast, spline_is_free
+from tcs.kernel.approach.grid import NOWHERE, PIECES
+from tcs.kernel.approach.memory import Approach
+from tcs.kernel.approach.scene import pair_contact_code
+from tcs.kernel.approach.turns import place_sample
+from tcs.kernel.arrays import FloatArray
+from tcs.kernel.cache import inner, int_constant
+from tcs.kernel.contacts import NO_CONTACT
+from tcs.kernel.dexterity.measures import rounded_inward
+from tcs.kernel.motion.straight import (
+    BLOCKED,
+    DONE,
+    LIMITS,
+    OFF_LINE,
+    next_on_line,
+    tangent_on_line,
+)
+from tcs.kernel.problem import Problem
+
+AT_GOAL = int_constant(0)
+"""Number of the point of a spline at the goal."""
+PER_LEVEL = MOST // PIECES
+"""Number of pieces of the spline between two levels of the grid."""
+APART = 8
+"""Number of columns from one posture to the next of a window, from which lines are followed."""
+
+
+@inner
+def lead_from(problem: Problem, approach: Approach, fastest: FloatArray, first: int) -> int:
+    """Follow the line from one of its points to both ends; return DONE, LIMITS or BLOCKED.
+
+    Args:
+        problem: The scene.
+        approach: The line is in place, and a posture on it in `search.q`; the spline is filled, and
+            `contact` if this is the first line that is blocked.
+        fastest: As for `approach_pair`.
+        first: Number of the point of the spline at which the posture is.
+    """
+    curve, scene, offset = approach.curve, approach.scene, approach.offset
+    points, slopes, line, q = curve.points, curve.slopes, curve.line, approach.search.q
+    for k in range(7):
+        line.locked[k] = 0
+    if not next_on_line(scene, line, offset, first / MOST, q, points[first]):
+        return LIMITS
+    for side in range(2):
+        step = 1 - 2 * side
+        for k in range(7):
+            line.locked[k] = 0
+        n = first
+        while True:
+            if not tangent_on_line(scene, line, offset, points[n], slopes[n]):
+                return LIMITS
+            for k in range(7):
+                if abs(slopes[n, k]) > fastest[k]:
+                    return LIMITS
+            if n == (0 if side else MOST):
+                break
+            n += step
+            if not next_on_line(scene, line, offset, n / MOST, points[n - step], points[n]):
+                return LIMITS
+            if is_too_fast(points, n + side, MOST, fastest):
+                return LIMITS
+    for k in range(7):
+        line.locked[k] = 0
+    if finish_spline(scene, approach.motion, curve, offset, MOST) > OFF_LINE:
+        return LIMITS
+    if spline_is_free(scene, approach.motion, curve):
+        return DONE
+    if approach.contact[0] == NO_CONTACT:
+        approach.contact[0] = pair_contact_code(problem, scene, curve.blocked[1])
+    return BLOCKED
+
+
+@inner
+def lead_through_windows(
+    problem: Problem, approach: Approach, fastest: FloatArray, b: int, level: int
+) -> bool:
+    """Follow lines through all windows of a level of a branch.
+
+    Returns:
+        Whether one is free; `search.best` is filled then, with the posture at the goal.
+    """
+    low, high = _next_window(approach, b, level, approach.grid.spans[b, level, 0])
+    while low != NOWHERE:
+        width = high + 1 - low
+        count = (width + APART - 1) // APART
+        for n in range(count):
+            column = low + (2 * n + 1) * width // (2 * count)
+            if _lead_through(problem, approach, fastest, b, column, level):
+                return True
+        low, high = _next_window(approach, b, level, high + 1)
+    return False
+
+
+@inner
+def _lead_through(
+    problem: Problem, approach: Approach, fastest: FloatArray, b: int, column: int, level: int
+) -> bool:
+    """Follow the line through a node of the grid; return whether it is free.
+
+    Args:
+        problem: The scene.
+        approach: The grid is in place; `search.best` is filled, with the posture at the goal.
+        fastest: As for `approach_pair`.
+        b: The branch.
+        column: Column of the node.
+        level: Its level.
+    """
+    arm, grid, search = problem.arm, approach.grid, approach.search
+    angle = grid.origin[0] + column * grid.origin[1]
+    place_sample(arm, grid.goal[level], arm.branches[b], angle, search.q, approach.motion.turns)
+    if lead_from(problem, approach, fastest, level * PER_LEVEL) != DONE:
+        return False
+    for k in range(7):
+        search.best[k] = within(approach.curve.points[0, k], arm.lower[k], arm.upper[k])
+    # It counts only if the posture at the goal, as it is stored, leads along that line again.
+    rounded_inward(search.best, arm.lower, arm.upper, search.q)
+    return lead_from(problem, approach, fastest, AT_GOAL) == DONE
+
+
+@inner
+def narrowest_level(approach: Approach, b: int) -> int:
+    """Return the level with the fewest open nodes of a branch: all lines lead through it.
+
+    Nodes at the goal are closed where lines have been followed.
+    """
+    grid, level, fewest = approach.grid, NOWHERE, 0
+    for n in range(min(1, grid.deepest[b]), grid.deepest[b] + 1):
+        count = 0
+        for i in range(grid.spans[b, n, 0], grid.spans[b, n, 1] + 1):
+            count += grid.is_open[b, n, i]
+        if level == NOWHERE or count <= fewest:
+            level, fewest = n, count
+    return level
+
+
+@inner
+def _next_window(approach: Approach, b: int, level: int, column: int) -> tuple[int, int]:
+    """Return the first and the last column of the next open window, NOWHERE without one."""
+    is_open, last = approach.grid.is_open[b, level], approach.grid.spans[b, level, 1]
+    first = column
+    while first <= last and not is_open[first]:
+        first += 1
+    if first > last:
+        return NOWHERE, NOWHERE
+    end = first
+    while end < last and is_open[end + 1]:
+        end += 1
+    return first, end
