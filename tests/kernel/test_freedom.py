@@ -210,6 +210,57 @@ def test_further_poses_are_next_to_their_samples(name):
     assert np.all(np.bincount(free.children, minlength=poses)[samples:] > 0)
 
 
+def cone(degrees, **more):
+    """Return the freedom of a cone about x."""
+    return Freedom(axis=X, tilt=math.radians(degrees), **more)
+
+
+BOX = (0.01, 0.01, 0.02)
+WIDER = {
+    "cone": [cone(d) for d in (3, 12, 20, 25, 30, 90)],
+    "rotation": [cone(20), cone(20, rotates=True), cone(33, rotates=True)],
+    "rotation first": [Freedom(axis=X, rotates=True), cone(20, rotates=True)],
+    "symmetry": [cone(20, fold=2), cone(25, fold=4), cone(25, rotates=True)],
+    "symmetry alone": [Freedom(axis=X, fold=6), Freedom(axis=X, rotates=True)],
+    "box": [Freedom(box=(0.01, 0.0, 0.0)), Freedom(box=BOX), Freedom(box=(0.012, 0.03, 0.02))],
+    "all": [cone(20, box=BOX), cone(20, box=BOX, rotates=True), cone(40, box=BOX, rotates=True)],
+    "displaced": [Freedom(axis=X, rotates=True, box=BOX), cone(10, box=BOX, rotates=True)],
+    "orientation": [Freedom.of_orientation(), Freedom.of_orientation(BOX)],
+}
+"""Freedoms, each within the next one."""
+
+
+@pytest.mark.parametrize("name", WIDER)
+def test_a_wider_freedom_has_the_poses_of_a_narrower_one(name):
+    """And the same samples next to each of them: so what is tried, until one serves, is more."""
+    found = []
+    for free in WIDER[name]:
+        goals = free_goals(free.row()[None], CHAIN)
+        keys, samples = [u.tobytes() for u in goals.u + 0.0], goals.first[1]
+        near = {
+            (keys[n], keys[k])
+            for n in range(samples)
+            for k in goals.children[goals.child_first[n] : goals.child_first[n + 1]]
+        }
+        found.append((set(keys[:samples]), near))
+    for narrow, wide in itertools.pairwise(found):
+        assert narrow[0] < wide[0] or (narrow[0] == wide[0] and narrow[1] < wide[1])
+        assert narrow[1] <= wide[1]
+
+
+@pytest.mark.parametrize("joints", ["six", "seven"])
+@pytest.mark.parametrize("name", ["cone", "rotation", "box", "all"])
+def test_a_wider_freedom_reaches_no_less(name, joints):
+    chain = CHAIN if joints == "seven" else six_joint_chain("spherical wrist", 10)
+    before = np.zeros(1, np.bool_)
+    for free in WIDER[name][1:4]:
+        scene = scene_with(free, goals=3, seed=10, chain=chain)
+        reached = scores_of(scene, toy_grid(states=1)).reason == REACHED
+        assert np.all(reached | ~before)
+        before = reached
+    assert 5 < np.sum(before) < before.size
+
+
 def test_a_nominal_goal_beside_a_free_one_keeps_its_score():
     scene, grid = scene_with(FREEDOMS["orientation"]), toy_grid(states=1)
     mixed = scene._replace(freedom=scene.freedom * [[0.0], [1.0]])

@@ -26,22 +26,31 @@ COLUMNS = 9
 PARAMETERS = 6
 ANGLES = 24
 """Samples of a free angle about an axis: one every 15 degrees."""
-SAMPLES = (1, ANGLES, 32, 96, 192, 256, 256)
-"""Number of samples by the number of free parameters."""
+MIXED = 2
+"""Every second angle is tried with tilts and displacements too."""
+TILTS = np.radians([2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 90.0, 135.0, 180.0])
+"""Tilts of the samples [rad]."""
+AROUND = (4, 6, 8, 12, 16, 16, 16, 16, 16, 12, 1)
+"""Number of their directions."""
+DISPLACEMENTS = np.array([0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5])
+"""Displacements of the samples along an axis of the goal [m]."""
+AT_ANGLE = 3
+"""One tilt in so many is sampled at an angle about the axis other than 0 and 180 degrees."""
+AT_ROTATION = (0, 4, 16, 32)
+"""One displacement in so many is sampled at a rotation, by the number of axes it is along."""
+AT_BOTH = 8
+"""Factor of these numbers at a tilt and an angle about the axis at once."""
 ORIENTATIONS = 288
-"""Least number of samples of a tool that may have any orientation: its angles range over full
-turns."""
+"""Number of samples of a tool that may have any orientation: its angles range over full turns."""
+DIRECTIONS = 96
+"""Number of them for an arm that finds the angle about the axis."""
 SUBDIVISIONS = 4
 """Parts into which the spacing of the samples is divided where none of them reaches a goal."""
-TO_THE_RIM = 4.0 / 3.0
-"""Factor that spreads samples of tilts and positions before they are clipped to the bounds."""
+WITHIN = 1e-9
+"""Rounding of a bound [rad or m]."""
 FURTHER = 20
 """Further poses for each sample of a tool that may have any orientation."""
-MIRROR = np.array([-1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
-"""Factors of the coordinates of the same pose by the other quaternion."""
 FULL_TURN = 2.0 * np.pi
-TILTS = 96
-"""Number of samples of the direction of the axis for such an arm if it may be any."""
 FEWEST_JOINTS = 5
 """Number of joints of an arm that finds the angle about the axis together with its joints."""
 
@@ -63,88 +72,28 @@ class Poses(NamedTuple):
 
 
 def spacing(form: FloatArray) -> FloatArray:
-    """Return the spacing of the samples of each parameter, 0 where not free, shape (6,)."""
+    """Return the steps from which the best pose is refined, 0 where not free, shape (6,)."""
     step = np.zeros(PARAMETERS)
-    free = free_parameters(form)
-    along = sample_count(form) ** (1.0 / max(len(free), 1))
-    step[0] = FULL_TURN / (ANGLES if len(free) == 1 else along) if form[ROTATES] else 0.0
-    step[1:3] = 2.0 * form[TILT] / along
-    step[3:6] = 2.0 * form[HALF : HALF + 3] / along
+    others = form[TILT] > 0.0 or np.any(form[HALF : HALF + 3] > 0.0)
+    step[0] = FULL_TURN / ANGLES * (4.0 if others else 1.0) if form[ROTATES] else 0.0
+    step[1:3] = 0.4 * form[TILT]
+    step[3:6] = 0.4 * form[HALF : HALF + 3]
     return step
-
-
-def sample_count(form: FloatArray) -> int:
-    """Return the number of samples of a freedom, for each of its equivalent angles."""
-    count = SAMPLES[len(free_parameters(form))]
-    if form[TILT] < np.pi:
-        return count
-    return max(count, ORIENTATIONS if form[ROTATES] else TILTS)
-
-
-def free_parameters(form: FloatArray) -> list[int]:
-    """Return the numbers of the parameters that vary continuously."""
-    free = [0] if form[ROTATES] else []
-    free += [1, 2] if form[TILT] > 0.0 else []
-    return free + [3 + i for i in range(3) if form[HALF + i] > 0.0]
-
-
-def sampled(form: FloatArray, step: FloatArray) -> FloatArray:
-    """Return the samples of a freedom, the nominal pose first, shape (n, PARAMETERS).
-
-    One free angle is sampled evenly; several parameters by a low-discrepancy sequence, tilts evenly
-    on the sphere, with a quarter of the samples at the greatest tilt and on each pair of faces of
-    the box, where goals at the edge of the workspace are reached. Each equivalent angle of a
-    symmetric tool has the same samples.
-    """
-    count = sample_count(form)
-    if free_parameters(form) == [0]:
-        u = np.zeros((count, PARAMETERS))
-        u[:, 0] = np.arange(count) * step[0]
-    else:
-        u = _spread_over(form, count)
-    if form[ROTATES] or form[FOLD] <= 1:
-        return u
-    turns = []
-    for k in range(int(form[FOLD])):
-        turned = u.copy()
-        turned[:, 0] = k * FULL_TURN / form[FOLD]
-        turns.append(turned)
-    return np.concatenate(turns)
-
-
-def _spread_over(form: FloatArray, count: int) -> FloatArray:
-    """Return the nominal pose and a low-discrepancy sequence of others, shape (count, 6)."""
-    free = free_parameters(form)
-    u = np.zeros((count, PARAMETERS))
-    if not free:
-        return u
-    unit = spread(count - 1, len(free))
-    for k, parameter in enumerate(free):
-        if parameter == 0:
-            u[1:, 0] = FULL_TURN * unit[:, k]
-        elif parameter == 1:
-            # The rim of all directions is a single one.
-            factor = TO_THE_RIM if form[TILT] < np.pi else 1.0
-            cap = np.minimum(factor * unit[:, k], 1.0)
-            angle = np.arccos(1.0 - (1.0 - np.cos(form[TILT])) * cap)
-            azimuth = FULL_TURN * unit[:, k + 1]
-            u[1:, 1], u[1:, 2] = angle * np.cos(azimuth), angle * np.sin(azimuth)
-        elif parameter > 2:
-            along = np.clip(TO_THE_RIM * (2.0 * unit[:, k] - 1.0), -1.0, 1.0)
-            u[1:, parameter] = along * form[HALF + parameter - 3]
-    return u
 
 
 @lru_cache(maxsize=64)
 def poses_of(key: bytes) -> Poses:
-    """Return the poses of a freedom, whose row of `FreeGoals.form` has these bytes."""
+    """Return the poses of a freedom, whose row of `FreeGoals.form` has these bytes.
+
+    What is sampled, and which further poses are next to a sample, is the same in every freedom that
+    contains them: the poses of a freedom are among those of a wider one about the same axis, but
+    for those where any orientation serves.
+    """
     form = np.frombuffer(key)
-    step = spacing(form)
-    samples = sampled(form, step)
     if form[TILT] < np.pi:
-        more, near = _between(form, step, samples)
+        samples, more, near = _sampled(form)
     else:
-        more, near = _next_to(form, samples)
+        samples, more, near = _of_any_orientation(form)
     # A pose between two samples is listed with both, one about a sample once.
     listed = np.ones(near.shape, bool)
     listed[:, 1] = near[:, 0] != near[:, 1]
@@ -162,24 +111,170 @@ def poses_of(key: bytes) -> Poses:
     )
 
 
-def _next_to(form: FloatArray, samples: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Return further poses of a tool of any orientation, and the two samples nearest to each.
+def _sampled(form: FloatArray) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Return samples, further poses next to them, and the two samples next to each of these.
 
-    They go on where the sequence of the samples ends, so that all together are spread evenly.
+    Tilts and displacements are those of `TILTS` and `DISPLACEMENTS` within the bounds, the nominal
+    pose first. All are sampled alone, some together.
     """
-    count = 1 + (1 + FURTHER) * (len(samples) - 1)
-    more, here = _spread_over(form, count)[len(samples) :], _coordinates(form, samples)
-    # A rotation is a unit quaternion or its negative.
-    both = np.concatenate([here, here * MIRROR])
-    near = cKDTree(both).query(_coordinates(form, more), k=2)[1] % len(here)
-    return more, near.astype(np.int64)
+    tilts = np.concatenate([[[0.0, 0.0]], *map(_ring, TILTS, AROUND)])
+    tilt_within = np.hypot(tilts[:, 0], tilts[:, 1]) <= form[TILT] + WITHIN
+    every = np.arange(0.0, ANGLES) if form[ROTATES] else np.arange(form[FOLD]) * ANGLES / form[FOLD]
+    rows = []
+    for angle in every if form[ROTATES] or form[FOLD] > 1 else [0.0]:
+        mixes = not form[ROTATES] or angle % MIXED == 0
+        for i in np.flatnonzero(tilt_within) if mixes else [0]:
+            if i > 0 and angle % (ANGLES / 2) != 0 and (i + round(angle)) % AT_ANGLE:
+                continue
+            moved = _displacements(form, int(i), float(angle)) if mixes else np.zeros((1, 3))
+            row = np.zeros((len(moved), PARAMETERS))
+            row[:, 0], row[:, 1:3], row[:, 3:6] = angle * FULL_TURN / ANGLES, tilts[i], moved
+            rows.append(row)
+    samples = np.concatenate(rows)
+    more, near = [], []
+    for n, u in enumerate(samples):
+        if form[ROTATES] and not np.any(u[1:]):
+            # The samples of the angle alone are in order.
+            following = np.flatnonzero(~np.any(samples[:, 1:], axis=1))
+            after = following[(np.searchsorted(following, n) + 1) % ANGLES]
+            for part in range(1, SUBDIVISIONS):
+                step = part / SUBDIVISIONS * FULL_TURN / ANGLES
+                more.append(u + step * np.eye(PARAMETERS)[0])
+                near.append((n, after))
+        for moved in _beside(form, u):
+            more.append(moved)
+            near.append((n, n))
+    return (
+        samples,
+        np.array(more, dtype=np.float64).reshape(-1, PARAMETERS),
+        np.array(near, dtype=np.int64).reshape(-1, 2),
+    )
 
 
-def _coordinates(form: FloatArray, u: FloatArray) -> FloatArray:
-    """Return points whose distances are those of poses: quaternions, and positions in the box."""
+def _ring(tilt: float, count: int) -> FloatArray:
+    """Return tilts in directions around the axis [rad], shape (count, 2)."""
+    # Neighbouring rings are turned against each other.
+    azimuth = FULL_TURN * (np.arange(count) + 0.5 * (count % 4 == 0)) / count
+    return tilt * np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1)
+
+
+def _displacements(form: FloatArray, tilt: int, angle: float) -> FloatArray:
+    """Return the displacements in the box that are sampled at a rotation, shape (n, 3).
+
+    Args:
+        form: Row of `FreeGoals.form`.
+        tilt: Number of the tilt.
+        angle: Number of the angle about the axis, in `ANGLES` of a turn.
+    """
+    every = _all_displacements()
+    taken = np.all(np.abs(every) <= form[HALF : HALF + 3] + WITHIN, axis=1)
+    if tilt or angle:
+        one_in = np.array(AT_ROTATION)[np.count_nonzero(every, axis=1)]
+        one_in = np.maximum(one_in * (AT_BOTH if tilt and angle else 1), 1)
+        taken &= (7 * tilt + 3 * round(angle) + np.arange(len(every))) % one_in == 0
+    return every[taken]
+
+
+@lru_cache(maxsize=1)
+def _all_displacements() -> FloatArray:
+    """Return no displacement, and those along one axis, two and three, shape (n, 3)."""
+    steps = len(DISPLACEMENTS)
+    found = [np.zeros((1, 3))]
+    for axes in ((0,), (1,), (2,), (0, 1), (0, 2), (1, 2), (0, 1, 2)):
+        for number, step in enumerate(np.ndindex(*[steps] * len(axes))):
+            # Two opposite corners, of all in turn.
+            corner = number + number // steps
+            sides = [(corner >> k) % 2 * 2 - 1 for k in range(len(axes))]
+            at = np.zeros((2, 3))
+            at[:, axes] = DISPLACEMENTS[list(step)] * np.array([sides, np.negative(sides)])
+            found.append(at)
+    return np.concatenate(found)
+
+
+def _beside(form: FloatArray, u: FloatArray) -> list[FloatArray]:
+    """Return poses half-way from a sample to the next ones along each parameter.
+
+    Samples of more than one of rotation, tilt and displacement are many, and have none; half a turn
+    counts as no rotation.
+    """
+    found = []
+    tilt = float(np.hypot(u[1], u[2]))
+    is_rotated = u[0] != 0.0 and u[0] != FULL_TURN / 2.0
+    if sum(map(int, (is_rotated, tilt > 0.0, np.any(u[3:6])))) > 1:
+        return []
+    if form[TILT] > 0.0 and tilt == 0.0:
+        for x, y in _ring(0.5 * float(TILTS[0]), AROUND[0]):
+            moved = u.copy()
+            moved[1:3] = x, y
+            found.append(moved)
+    elif form[TILT] > 0.0:
+        for at in _half_way(TILTS, tilt):
+            moved = u.copy()
+            moved[1:3] *= at / tilt
+            found.append(moved)
+        half = np.pi / AROUND[int(np.argmin(np.abs(TILTS - tilt)))]
+        for side in (-half, half):
+            c, s = np.cos(side), np.sin(side)
+            moved = u.copy()
+            moved[1], moved[2] = c * u[1] - s * u[2], s * u[1] + c * u[2]
+            found.append(moved)
+    for k in range(3, PARAMETERS):
+        if form[HALF + k - 3] > 0.0:
+            far = abs(u[k])
+            for at in _half_way(DISPLACEMENTS, far) if far else (0.5 * float(DISPLACEMENTS[0]),):
+                for side in (np.sign(u[k]),) if far else (-1.0, 1.0):
+                    moved = u.copy()
+                    moved[k] = side * at
+                    found.append(moved)
+    return [moved for moved in found if _is_within(form, moved)]
+
+
+def _half_way(steps: FloatArray, at: float) -> list[float]:
+    """Return what is half-way from one of some steps to those before and after it."""
+    number = int(np.argmin(np.abs(steps - at)))
+    before = steps[number - 1] if number else 0.0
+    after = [0.5 * (at + steps[number + 1])] if number + 1 < len(steps) else []
+    return [0.5 * (at + before), *after]
+
+
+def _is_within(form: FloatArray, u: FloatArray) -> bool:
+    """Return whether parameters are within a freedom."""
     half = form[HALF : HALF + 3]
-    inside = u[:, 3:6] / np.where(half > 0.0, half, 1.0)
-    return np.concatenate([_orientations(form, u).as_quat(), inside], axis=1)
+    is_tilted = np.hypot(u[1], u[2]) > form[TILT] + WITHIN
+    return not is_tilted and bool(np.all(np.abs(u[3:6]) <= half + WITHIN))
+
+
+def _of_any_orientation(form: FloatArray) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Return what `_sampled` does, for a tool of any orientation.
+
+    The further poses go on where the sequence of the samples ends, so that all together are spread
+    evenly. Displaced poses are samples only.
+    """
+    samples = ORIENTATIONS if form[ROTATES] else DIRECTIONS
+    u = _orientations_spread(form, 1 + (1 + FURTHER) * (samples - 1))
+    here, more = u[:samples], u[samples:]
+    quaternions = _orientations(form, here).as_quat()
+    # A rotation is a unit quaternion or its negative.
+    tree = cKDTree(np.concatenate([quaternions, -quaternions]))
+    near = tree.query(_orientations(form, more).as_quat(), k=2)[1] % samples
+    displaced = [here]
+    for n, one in enumerate(here):
+        moved = _displacements(form, n, float(n > 0))[1:]
+        row = np.repeat(one[None], len(moved), axis=0)
+        row[:, 3:6] = moved
+        displaced.append(row)
+    return np.concatenate(displaced), more, near.astype(np.int64)
+
+
+def _orientations_spread(form: FloatArray, count: int) -> FloatArray:
+    """Return the nominal pose and a low-discrepancy sequence of any orientation, (count, 6)."""
+    unit = spread(count - 1, 3 if form[ROTATES] else 2)
+    u = np.zeros((count, PARAMETERS))
+    if form[ROTATES]:
+        u[1:, 0] = FULL_TURN * unit[:, 0]
+    angle, azimuth = np.arccos(1.0 - 2.0 * unit[:, -2]), FULL_TURN * unit[:, -1]
+    u[1:, 1], u[1:, 2] = angle * np.cos(azimuth), angle * np.sin(azimuth)
+    return u
 
 
 def wrist_positions(form: FloatArray, u: FloatArray, wrist: FloatArray) -> FloatArray:
@@ -197,40 +292,6 @@ def _orientations(form: FloatArray, u: FloatArray) -> Rotation:
     """Return the orientations R_GT of poses."""
     tilt = Rotation.from_rotvec(u[:, 1:2] * form[9:12] + u[:, 2:3] * form[12:15])
     return tilt * Rotation.from_rotvec(u[:, :1] * form[AXIS : AXIS + 3])
-
-
-def _between(
-    form: FloatArray, step: FloatArray, samples: FloatArray
-) -> tuple[FloatArray, IntArray]:
-    """Return further poses between or about samples, and the two samples next to each."""
-    free = free_parameters(form)
-    poses, near = [], []
-    if free == [0]:
-        for part in range(1, SUBDIVISIONS):
-            for i, u in enumerate(samples):
-                moved = u.copy()
-                moved[0] += step[0] * part / SUBDIVISIONS
-                poses.append(moved)
-                near.append((i, (i + 1) % len(samples)))
-    else:
-        for i, u in enumerate(samples):
-            for parameter in free:
-                for sign in (1.0, -1.0):
-                    moved = u.copy()
-                    moved[parameter] += sign * 0.5 * step[parameter]
-                    if _is_within(form, moved):
-                        poses.append(moved)
-                        near.append((i, i))
-    return (
-        np.array(poses, dtype=np.float64).reshape(-1, PARAMETERS),
-        np.array(near, dtype=np.int64).reshape(-1, 2),
-    )
-
-
-def _is_within(form: FloatArray, u: FloatArray) -> bool:
-    """Return whether parameters are within a freedom."""
-    half = form[HALF : HALF + 3]
-    return bool(np.hypot(u[1], u[2]) <= form[TILT] and np.all(np.abs(u[3:6]) <= half))
 
 
 @inner
