@@ -11,7 +11,8 @@ from __future__ import annotations
 import gc
 import hashlib
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar, cast
@@ -67,14 +68,26 @@ def jit_folder() -> Path | None:
         return None
 
 
-def is_compiled(entry: str = "analytic.pairs.score_pair") -> bool:
-    """Return whether the cache holds machine code of the whole scoring kernel.
+_to_announce: list[Callable[[], None]] = []
+"""What is called before the next function is compiled."""
+
+
+@contextmanager
+def announced(on_compile: Callable[[], None] | None) -> Iterator[None]:
+    """Call a function, once, before anything is compiled within the context, in any thread.
+
+    Machine code that is loaded for the types of the arguments at hand is not compiled.
 
     Args:
-        entry: Function into which the rest is compiled, with its module below `tcs.kernel`.
+        on_compile: The function.
     """
-    folder = jit_folder()
-    return folder is not None and any(folder.glob(f"tcs.kernel.{entry}-*.nbc"))
+    if on_compile is not None:
+        _to_announce.append(on_compile)
+    try:
+        yield
+    finally:
+        if on_compile in _to_announce:
+            _to_announce.remove(on_compile)
 
 
 def int_constant(number: int) -> int:
@@ -130,6 +143,8 @@ class _Entry(CPUDispatcher):
         """
         code: object = self._cache  # type: ignore[attr-defined]
         kept = isinstance(code, CodeCache) and code.has(sig, self.targetctx)
+        while not kept and _to_announce:
+            _to_announce.pop()()
         check_room(CODE if kept else COMPILING)
         before = gc.get_threshold()
         gc.set_threshold(*_COLLECTIONS)

@@ -21,13 +21,12 @@ from numpy.typing import NDArray
 from tcs.errors import TcsError
 from tcs.files.blocks import BlockFolder, opened_if
 from tcs.kernel.arrays import FloatArray
-from tcs.kernel.cache import is_compiled
+from tcs.kernel.cache import announced
 from tcs.kernel.motion.connect import connect
 from tcs.kernel.motion.random import random_state
 from tcs.kernel.motion.trees import Trees, new_trees
 from tcs.motion.approach import Access, accesses, first_accesses
 from tcs.motion.kept_outcomes import KeptOutcomes, Outcomes, outcomes_key, table_of
-from tcs.motion.plans import ENTRY
 from tcs.motion.stops import BodyPair, Stop, StopGrid
 from tcs.placement.scoring.rebuild import rebuild_scene
 from tcs.placement.store import MotionFile, ScoreFile, files_of_arms
@@ -86,14 +85,13 @@ def examine(
     begun, processor = time.perf_counter(), time.process_time()
     number = file.nominal_index if table is None else table
     built = [rebuild_scene(of_arm) for of_arm in files_of_arms(file)]
-    if on_compile is not None and not is_compiled(ENTRY):
-        on_compile()
     sets = file.tables[number].sets
     rows = drawn(worth_examining(sets, within, most), sample, seed)
     arms = [StopGrid.of(job, scene, job.scored_grid, lowered) for job, scene, lowered in built]
     with opened_if(blocks, lambda: outcomes_key(arms, seed)) as opened:
         kept = None if opened is None else KeptOutcomes(opened, number)
-        outcomes = _examined(arms, sets, rows, number, seed, jobs, kept, on_progress)
+        with announced(on_compile):
+            outcomes = _examined(arms, sets, rows, number, seed, jobs, kept, on_progress)
     examined = table_of(sets.candidates[rows], outcomes, sets.weights.size)
     tables: list[MotionTable | None] = [None] * len(file.tables)
     tables[number] = examined

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import SelectionError, TcsError, UnknownNameError
-from tcs.kernel.cache import is_compiled
+from tcs.kernel.cache import announced
 from tcs.model.grid import Grid, InitialConfiguration
 from tcs.model.robots import LEAST_JERK, MOST_JERK
 from tcs.motion.motion_plan import GoalResult, MotionPlan
@@ -23,8 +23,6 @@ from tcs.placement.selection import Choice
 from tcs.placement.store import ScoreFile, file_of_arm
 from tcs.placement.tables import RefinedSet
 
-ENTRY = "motion.connect.connect"
-"""The function of the planner that takes longest to compile."""
 PLANNED = 0.5
 """Fraction of the progress of a stop that is planning; the rest is the re-check with Drake."""
 
@@ -90,8 +88,6 @@ def plan(
         file, members = _of_one_arm(file, numbers)
     job, scene, _ = rebuild_scene(file)
     limits = np.minimum(job.spec.robot.arm_jerks(), np.inf if jerk is None else jerk)
-    if on_compile is not None and not is_compiled(ENTRY):
-        on_compile()
     if isinstance(members, RefinedSet):
         places, serving = _refined_places(whole, job, members)
     else:
@@ -111,10 +107,11 @@ def plan(
             # The most dexterous stop serves a goal; later stops take over what it could not do.
             and (able[0] == number or goal in results)
         ]
-        stop = Stop.at_values(job, scene, values, seed)
         index = h if numbers is None else numbers[number]
         report = _StopProgress(on_progress, number, len(places))
-        planned, found = plan_stop(stop, index, number, goals, order, limits, report.planned)
+        with announced(on_compile):
+            stop = Stop.at_values(job, scene, values, seed)
+            planned, found = plan_stop(stop, index, number, goals, order, limits, report.planned)
         results |= {result.goal: result for result in found}
         stops.append(planned)
         check = StopCheck(stop, check)

@@ -4,8 +4,6 @@ import os
 import resource
 import subprocess
 import sys
-from importlib import import_module
-from types import SimpleNamespace
 
 import pytest
 
@@ -37,26 +35,6 @@ def test_what_fails_to_load_is_told_as_want_of_memory_only_with_a_limit(monkeypa
     assert all(map(is_for_want_of_memory, errors))
     assert not is_for_want_of_memory(ImportError("No module named 'yaml'"))
     assert not is_for_want_of_memory(FileNotFoundError(2, "No such file", "libllvmlite.so"))
-
-
-@pytest.mark.parametrize(
-    ("is_kept", "needed"),
-    [(True, memory.CODE), (False, memory.COMPILING)],
-    ids=["kept", "compiled"],
-)
-def test_compiling_needs_more_room_than_loading_machine_code(is_kept, needed, monkeypatch):
-    kernel_start = import_module("tcs.placement.scoring.kernel_start")
-    asked = []
-
-    def refuse(room):
-        asked.append(room)
-        raise MemoryError
-
-    monkeypatch.setattr(kernel_start, "is_compiled", lambda _: is_kept)
-    monkeypatch.setattr(kernel_start, "check_room", refuse)
-    with pytest.raises(MemoryError):
-        kernel_start.warm_up(SimpleNamespace(joints=6))
-    assert asked == [needed]
 
 
 def test_a_command_that_would_compile_in_too_little_room_ends_in_one_line(tmp_path):

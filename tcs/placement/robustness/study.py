@@ -12,7 +12,6 @@ from typing import Any
 from joblib import Parallel, delayed
 
 from tcs.errors import StoreMismatchError
-from tcs.kernel.cache import is_compiled
 from tcs.placement.robustness.comparison import MethodComparison, compare_methods
 from tcs.placement.robustness.evaluation import Evaluation, evaluate
 from tcs.placement.robustness.gains import Gain, Prediction, predictions, robust_gains
@@ -181,9 +180,8 @@ def study_rows(
     Raises:
         TcsError: As `study_row`.
     """
-    if not is_compiled():
-        # Compile once, not in every process.
-        Trials.of(load_scores(paths[0]), on_compile=on_compile).start.ensure()
+    # Compile once, not in every process.
+    Trials.of(load_scores(paths[0]), on_compile=on_compile).start.ensure()
     done = []
     # Processes, because much of the work holds the global interpreter lock.
     work = Parallel(n_jobs=min(jobs, len(paths)), return_as="generator")

@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
 SLICE = 512
 """Reached pairs per slice: tens of milliseconds of work."""
-ENTRY = "approach.pairs.approach_pair"
-"""Function into which the kernel of approaches is compiled, with its module."""
 
 
 def approach_lines(job: Job) -> ApproachLines:

@@ -6,20 +6,15 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
-from tcs.files.memory import CODE, COMPILING, check_room
 from tcs.kernel.analytic.solver import is_outside
-from tcs.kernel.cache import is_compiled
+from tcs.kernel.cache import announced
 from tcs.kernel.problem import Problem
 from tcs.kernel.sweep import gripper_contacts
-from tcs.placement.scoring.approaches import ENTRY, ApproachScorer
+from tcs.placement.scoring.approaches import ApproachScorer
 from tcs.placement.scoring.engines import Work
 
 ANALYTIC, NUMERIC = "analytic", "numeric"
 """Solution of the inverse kinematics: in closed form, or by Newton's method from many starts."""
-_ENTRIES = {ANALYTIC: "analytic.pairs.score_pair", NUMERIC: "numeric.pairs.score_pair"}
-"""Pair scorers, compiled last but for the sweep: package, module and function."""
-_OF_FEWER = {5: "five_joints.pairs.score_turned", 6: "six_joints.pairs.score_pair"}
-"""The pair scorers of arms of fewer than seven joints, by the number of joints."""
 
 
 @dataclass(eq=False, slots=True)
@@ -64,14 +59,8 @@ def warm_up(
     Raises:
         MemoryError: If the address space is limited, and too little is left.
     """
-    entries = [_OF_FEWER.get(problem.joints, _ENTRIES[ik_of(problem)])]
-    if approaches is not None:
-        entries.append(ENTRY)
-    is_kept = all(map(is_compiled, entries))
-    if on_compile is not None and not is_kept:
-        on_compile()
-    check_room(CODE if is_kept else COMPILING)
     begun = time.perf_counter()
-    Work(problem, gripper_contacts(problem)).warm_up()
-    seconds = time.perf_counter() - begun
-    return seconds + (0.0 if approaches is None else approaches.warm_up())
+    with announced(on_compile):
+        Work(problem, gripper_contacts(problem)).warm_up()
+        seconds = time.perf_counter() - begun
+        return seconds + (0.0 if approaches is None else approaches.warm_up())
