@@ -16,7 +16,6 @@ import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import yaml
@@ -49,8 +48,9 @@ from tcs.capability.arplace.query import wilson_interval
 from tcs.errors import SelectionError
 from tcs.files.writing import make_folder
 from tcs.kernel.problem import build_problem
-from tcs.kernel.scores import REACHED, Scores
-from tcs.kernel.sweep import gripper_contacts, score_slice
+from tcs.kernel.rows import grid_rows
+from tcs.kernel.scores import REACHED, new_scores
+from tcs.kernel.sweep import gripper_contacts, score_rows
 from tcs.model.grid import Axis, Grid
 from tcs.model.random_streams import named_generator
 from tcs.model.robots import load_robot
@@ -291,14 +291,9 @@ class Judge:
         p = np.column_stack([distance + offsets[:, 0], offsets[:, 1], np.full(count, HEIGHT)])
         R = np.tile(grasp_rotation(self.task, 0.0), (count, 1, 1))
         arrays = lowered.arrays._replace(goal_R=R[None], goal_p=p[None])
-        problem = build_problem(arrays, lowered.grid)
-        scores: Any = Scores(
-            np.empty((1, count), np.uint8),
-            np.empty((1, count), np.int32),
-            np.zeros((1, count), np.float32),
-            np.zeros((1, count, 7), np.float32),
-        )
-        score_slice(problem, gripper_contacts(problem), 0, 1, scores)
+        problem = build_problem(arrays)
+        scores = new_scores(1, count)
+        score_rows(problem, gripper_contacts(problem), grid_rows(lowered.grid), scores)
         return int(np.count_nonzero(scores.reason == REACHED))
 
 

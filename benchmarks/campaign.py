@@ -126,10 +126,10 @@ def estimates(group: Sequence[Job], people: People) -> list[dict[str, Any]]:
         if refusal is not None:
             continue
         (arrays,) = in_scene.arrays_of([scale], of_everyone)
-        problem = build_problem(arrays, lowered.grid, MEASURE)
+        problem = build_problem(arrays, MEASURE)
         if not slices:
             warm_up(problem)
-        work = Work(problem, gripper_contacts(problem))
+        work = Work(problem, lowered.grid, gripper_contacts(problem))
         slices += [scored_slice(work, Part(k, min(k + SLICE, size))) for k in begins]
     if not slices:
         return [{"refused": refusal} for refusal in refused]

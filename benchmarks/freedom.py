@@ -23,8 +23,9 @@ from numpy.typing import NDArray
 from table import cell, header, parser, row, save
 
 from tcs.kernel.problem import Problem, build_problem
-from tcs.kernel.scores import BODY_BLOCKED, REACHED, Scores
-from tcs.kernel.sweep import gripper_contacts, score_slice
+from tcs.kernel.rows import Rows, rows_at
+from tcs.kernel.scores import BODY_BLOCKED, REACHED, new_scores
+from tcs.kernel.sweep import gripper_contacts, score_rows
 from tcs.kernel.verification.free_scans import at_poses
 from tcs.model.tasks import Freedom, Task, load_task
 from tcs.placement.robustness.statistics import binomial_interval
@@ -67,21 +68,21 @@ def recall(robot: str, freedom: str, options: argparse.Namespace) -> None:
     """Score pairs and scan those unreached; print and record what was found."""
     job = load_job(free_task(FREEDOMS[freedom]), ENVIRONMENT, robot)
     lowered = job.lowered(job.scene())
-    problem, grid = build_problem(lowered.arrays, lowered.grid), lowered.grid
-    places = grid.base_x.size * grid.base_y.size * grid.base_yaw.size
-    total = places * grid.torso_levels * grid.environment_states
-    drawn = np.random.default_rng(options.seed).choice(total, options.configurations, replace=False)
+    problem, grid = build_problem(lowered.arrays), lowered.grid
+    drawn = np.random.default_rng(options.seed).choice(
+        grid.size, options.configurations, replace=False
+    )
     configurations = np.sort(drawn)
     # Load or compile the machine code.
-    reasons_at(problem, configurations[:1])
-    reasons, seconds = reasons_at(problem, configurations)
+    reasons_at(problem, rows_at(grid, configurations[:1]))
+    reasons, seconds = reasons_at(problem, rows_at(grid, configurations))
     reached = int(np.count_nonzero(reasons == REACHED))
     scanned = missed = 0
     scan_seconds = 0.0
     for goal in range(reasons.shape[1]):
         left = configurations[~np.isin(reasons[:, goal], ANY_GOAL)]
         # The wheelchair has a single state.
-        found, taken = reasons_at(at_poses(problem, 0, goal), left)
+        found, taken = reasons_at(at_poses(problem, 0, goal), rows_at(grid, left))
         missed += int(np.count_nonzero((found == REACHED).any(axis=1)))
         scanned, scan_seconds = scanned + len(left), scan_seconds + taken
     if not reached:
@@ -107,30 +108,19 @@ def free_task(freedom: Freedom) -> Task:
     return replace(task, goals=tuple(replace(goal, free=freedom) for goal in task.goals))
 
 
-def reasons_at(
-    problem: Problem, configurations: NDArray[np.int64]
-) -> tuple[NDArray[np.uint8], float]:
+def reasons_at(problem: Problem, rows: Rows) -> tuple[NDArray[np.uint8], float]:
     """Score configurations at all goals of a problem.
 
     Args:
         problem: The problem.
-        configurations: Flat indices of initial configurations, shape (n,).
+        rows: The configurations.
 
     Returns:
         Codes of reasons, shape (n, goals), and the processor time [s].
     """
-    goals = problem.goal_p.shape[1]
-    reasons, begun = np.empty((len(configurations), goals), np.uint8), time.process_time()
-    grippers = gripper_contacts(problem)
-    for i, configuration in enumerate(configurations.tolist()):
-        scores = Scores(
-            reasons[i : i + 1],
-            np.empty((1, goals), np.int32),
-            np.full((1, goals), -1.0, np.float32),
-            np.zeros((1, goals, 7), np.float32),
-        )
-        score_slice(problem, grippers, configuration, configuration + 1, scores)
-    return reasons, time.process_time() - begun
+    scores, begun = new_scores(rows.state.size, problem.goal_p.shape[1]), time.process_time()
+    score_rows(problem, gripper_contacts(problem), rows, scores)
+    return scores.reason, time.process_time() - begun
 
 
 if __name__ == "__main__":

@@ -11,10 +11,11 @@ from peer_problems import Bench, Pair
 from sample_costs import measure_fractions
 from table import cell, row, spread
 
-from tcs.kernel.arrays import FloatArray, IntArray
+from tcs.kernel.arrays import FloatArray, GridArrays, IntArray
 from tcs.kernel.problem import UNCHECKED, Problem
-from tcs.kernel.scores import Scores
-from tcs.kernel.sweep import score_slice
+from tcs.kernel.rows import grid_rows
+from tcs.kernel.scores import new_scores
+from tcs.kernel.sweep import score_rows
 from tcs.placement.scoring import sweep
 from tcs.placement.scoring.engines import SLICE
 from tcs.placement.tables import Reason
@@ -101,7 +102,7 @@ def part_costs(bench: Bench, pairs: tuple[Pair, ...], repeats: int) -> None:
     taken: dict[str, list[float]] = {name: [] for name in stages}
     for _ in range(repeats):
         for name, (stage, grippers) in stages.items():
-            taken[name].append(_processor_seconds(stage, grippers, len(bench.scores.reason)))
+            taken[name].append(_processor_seconds(stage, grippers, bench.lowered.grid))
     base, reach, solved, whole = (np.array(taken[name]) for name in stages)
     _measured(f"kernel on 1/{EVERY} of the grid, jobs 1", f"{spread(list(whole))}, of which")
     _part("base check", base / whole)
@@ -118,23 +119,17 @@ def _winners(bench: Bench, checker: WinnersChecker) -> FloatArray:
     at = bench.job.scored_grid.values(h)
     base = np.stack([at["base_x"], at["base_y"], at["base_yaw"]], axis=1)
     arm = bench.scores.arm_joints.astype(np.float64)
-    return checker.configurations(base, h % bench.problem.torso_levels, arm)
+    return checker.configurations(base, h % bench.lowered.grid.torso_levels, arm)
 
 
-def _processor_seconds(problem: Problem, grippers: IntArray, size: int) -> float:
+def _processor_seconds(problem: Problem, grippers: IntArray, grid: GridArrays) -> float:
     """Return the processor time of every EVERY-th slice of the grid."""
     goals, used = problem.goal_p.shape[1], 0.0
-    for start in range(0, size, EVERY * SLICE):
-        stop = min(start + SLICE, size)
-        shape = (stop - start, goals)
-        scores = Scores(
-            reason=np.empty(shape, np.uint8),
-            contact=np.empty(shape, np.int32),
-            dexterity=np.zeros(shape, np.float32),
-            joints=np.zeros((*shape, 7), np.float32),
-        )
+    for start in range(0, grid.size, EVERY * SLICE):
+        rows = grid_rows(grid, start, min(start + SLICE, grid.size))
+        scores = new_scores(rows.state.size, goals)
         begun = time.process_time()
-        score_slice(problem, grippers, start, stop, scores)
+        score_rows(problem, grippers, rows, scores)
         used += time.process_time() - begun
     return used
 

@@ -17,9 +17,11 @@ from numpy.typing import NDArray
 from table import cell, header, parser, row, save
 
 from tcs.kernel.analytic.solver import outside_solver
+from tcs.kernel.arrays import GridArrays
 from tcs.kernel.problem import Problem, build_problem
-from tcs.kernel.scores import REACHED, Scores
-from tcs.kernel.sweep import gripper_contacts, score_slice
+from tcs.kernel.rows import grid_rows
+from tcs.kernel.scores import REACHED, new_scores
+from tcs.kernel.sweep import gripper_contacts, score_rows
 from tcs.placement.scoring import load_job
 from tcs.placement.scoring.engines import SLICE
 
@@ -37,10 +39,10 @@ def main() -> int:
     for robot, task in (name.split(":") for name in options.rows.split(",")):
         job = load_job(task, ENVIRONMENT, robot)
         lowered = job.lowered(job.scene())
-        problem = build_problem(lowered.arrays, lowered.grid)
+        problem = build_problem(lowered.arrays)
         numeric = problem._replace(arm=outside_solver(lowered.arrays.chain))
-        closed, seconds = reached(problem, job.scored_grid.size, options.jobs)
-        found, numeric_seconds = reached(numeric, job.scored_grid.size, options.jobs)
+        closed, seconds = reached(problem, lowered.grid, options.jobs)
+        found, numeric_seconds = reached(numeric, lowered.grid, options.jobs)
         both, only = int(np.sum(closed & found)), int(np.sum(found & ~closed))
         total = int(np.sum(closed))
         line = f"{robot}, {task}"
@@ -55,19 +57,14 @@ def main() -> int:
     return 0
 
 
-def reached(problem: Problem, size: int, jobs: int) -> tuple[NDArray[np.bool_], float]:
+def reached(problem: Problem, grid: GridArrays, jobs: int) -> tuple[NDArray[np.bool_], float]:
     """Return which pairs are reached, shape (size, goals), and the processor time [s]."""
-    grippers = gripper_contacts(problem)
+    size, grippers = grid.size, gripper_contacts(problem)
 
     def part(start: int) -> NDArray[np.bool_]:
-        shape = (min(start + SLICE, size) - start, problem.goal_p.shape[1])
-        scores = Scores(
-            reason=np.empty(shape, np.uint8),
-            contact=np.empty(shape, np.int32),
-            dexterity=np.zeros(shape, np.float32),
-            joints=np.zeros((*shape, 7), np.float32),
-        )
-        score_slice(problem, grippers, start, start + shape[0], scores)
+        rows = grid_rows(grid, start, min(start + SLICE, size))
+        scores = new_scores(rows.state.size, problem.goal_p.shape[1])
+        score_rows(problem, grippers, rows, scores)
         return scores.reason == REACHED
 
     # Compiled, or loaded, before the clock runs.

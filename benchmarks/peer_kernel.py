@@ -11,11 +11,12 @@ from tcs.kernel.analytic.scratch import Search, new_search
 from tcs.kernel.arrays import IntArray
 from tcs.kernel.cache import jit
 from tcs.kernel.problem import Problem
-from tcs.kernel.scores import Scores
+from tcs.kernel.rows import Rows, rows_at
+from tcs.kernel.scores import Scores, new_scores
 
-# `score_slice` does the same with memory of its own, but is not compiled: a call from Python takes
+# `score_rows` does the same with memory of its own, but is not compiled: a call from Python takes
 # longer than a pair.
-from tcs.kernel.sweep import _score_slice
+from tcs.kernel.sweep import _score_rows
 from tcs.kernel.workspace import Workspace, new_workspace
 from tcs.placement.tables import Reason
 
@@ -29,31 +30,37 @@ def score_each(
     work: Workspace,
     search: Search,
     grippers: IntArray,
-    configurations: IntArray,
+    rows: Rows,
     repeats: int,
     scores: Scores,
 ) -> None:
-    """Score configurations one by one, as slices of one, the whole row of them `repeats` times.
+    """Score configurations one by one, each by itself, all of them `repeats` times.
 
     Args:
         problem: The scene, with a single goal.
         work: Scratch memory.
         search: Scratch memory.
         grippers: From `gripper_contacts`, of that goal.
-        configurations: Flat indices, shape (n,).
+        rows: The configurations.
         repeats: How often.
         scores: Filled, n rows.
     """
     for _ in range(repeats):
-        for i in range(len(configurations)):
-            h = configurations[i]
+        for i in range(len(rows.state)):
+            row = Rows(
+                rows.state[i : i + 1],
+                rows.x[i : i + 1],
+                rows.y[i : i + 1],
+                rows.yaw[i : i + 1],
+                rows.torso[i : i + 1],
+            )
             one = Scores(
                 scores.reason[i : i + 1],
                 scores.contact[i : i + 1],
                 scores.dexterity[i : i + 1],
                 scores.joints[i : i + 1],
             )
-            _score_slice(problem, None, work, search, grippers, h, h + 1, one)
+            _score_rows(problem, None, work, search, grippers, row, one)
 
 
 class Kernel:
@@ -75,6 +82,7 @@ class Kernel:
             for g in goals
         ]
         self._grippers = [np.ascontiguousarray(bench.grippers[:, g : g + 1]) for g in goals]
+        self._grid = bench.lowered.grid
         self._work, self._search = new_workspace(bench.problem), new_search()
         # Load or compile the machine code.
         self._score(0, np.zeros(1, np.int64), 1)
@@ -103,12 +111,7 @@ class Kernel:
         return used / REPEATS
 
     def _score(self, g: int, rows: IntArray, repeats: int) -> Scores:
-        scores = Scores(
-            reason=np.empty((rows.size, 1), np.uint8),
-            contact=np.empty((rows.size, 1), np.int32),
-            dexterity=np.zeros((rows.size, 1), np.float32),
-            joints=np.zeros((rows.size, 1, 7), np.float32),
-        )
-        memory = self._work, self._search
-        score_each(self._problems[g], *memory, self._grippers[g], rows, repeats, scores)
+        scores = new_scores(rows.size, 1)
+        memory, at = (self._work, self._search), rows_at(self._grid, rows)
+        score_each(self._problems[g], *memory, self._grippers[g], at, repeats, scores)
         return scores

@@ -16,6 +16,7 @@ from pydrake.math import RigidTransform
 
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.problem import Problem, build_problem
+from tcs.kernel.rows import rows_at
 from tcs.kernel.sweep import gripper_contacts
 from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan
 from tcs.model.scene import LoweredScene, Scene, goal_poses
@@ -54,7 +55,7 @@ class Bench:
         job = load_job(TASK, ENVIRONMENT, ROBOT)
         scene = job.scene()
         lowered = job.lowered(scene)
-        problem = build_problem(lowered.arrays, lowered.grid)
+        problem = build_problem(lowered.arrays)
         scores = sweep(lowered, job.task.weights).tables[0]
         return cls(job, scene, lowered, problem, gripper_contacts(problem), scores)
 
@@ -128,7 +129,10 @@ def draw(bench: Bench, judge: Judge, count: int, seed: int) -> ProblemSet:
     for h, g in candidates[order]:
         if all(len(found[key]) == wanted[key] for key in found):
             break
-        reachable = dense_scan(bench.problem, int(h), int(g), DENSE_SAMPLES, q) >= 0.0
+        reachable = (
+            dense_scan(bench.problem, rows_at(bench.lowered.grid, [h]), int(g), DENSE_SAMPLES, q)
+            >= 0.0
+        )
         drawn += 1
         pair = _pair(bench, int(h), int(g), reachable)
         if reachable and not judge.confirms(pair, q):
@@ -150,7 +154,7 @@ def _pair(bench: Bench, h: int, g: int, reachable: bool) -> Pair:
     return Pair(
         configuration=h,
         goal=g,
-        torso_level=h % bench.problem.torso_levels,
+        torso_level=h % bench.lowered.grid.torso_levels,
         base=base,
         torso=at["torso"],
         X_WG=X_WG,

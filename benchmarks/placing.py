@@ -24,6 +24,7 @@ from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.kernel.motion.edges import certified
 from tcs.kernel.motion.scene import motion_scene, new_motion_workspace
 from tcs.kernel.problem import Problem
+from tcs.kernel.rows import single_row
 from tcs.model.robots import load_robot
 from tcs.placement.refinement.poses import PoseScene
 
@@ -81,7 +82,7 @@ def measured(robot: str, options: argparse.Namespace) -> list[str]:
 
 def trajectory(problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
     """Return tool poses in W along a random joint path from a random base pose, (count, 4, 4)."""
-    scene = motion_scene(problem, 0)
+    scene = motion_scene(problem, single_row())
     work = new_motion_workspace(scene)
     low, high = np.maximum(problem.arm.lower, -np.pi), np.minimum(problem.arm.upper, np.pi)
     while True:

@@ -40,6 +40,7 @@ from tcs.kernel.motion.scene import (
 )
 from tcs.kernel.motion.trees import Trees, new_trees
 from tcs.kernel.problem import build_problem
+from tcs.kernel.rows import single_row
 from tcs.model.scene import LoweredScene
 from tcs.motion.paths import SHORTCUTS
 from tcs.placement.scoring import load_job
@@ -132,10 +133,7 @@ class Bench:
     def query(self, problem: Problem) -> Query:
         """Return a problem, prepared for planning."""
         arrays = self._arrays(problem.obstacles)
-        grid = self.lowered.grid._replace(
-            environment_states=1, base_x=np.zeros(1), base_y=np.zeros(1), base_yaw=np.zeros(1)
-        )
-        scene = motion_scene(build_problem(arrays, grid), 0)
+        scene = motion_scene(build_problem(arrays), single_row())
         own = scene.body[scene.pair[:, 1]] >= len(problem.obstacles)
         needed = np.ones(len(scene.pair), np.bool_)
         if self.needed is None:

@@ -73,7 +73,7 @@ def lowered_times(options: argparse.Namespace) -> None:
     job = load_job(options.task, "wheelchair", "pr2")
     lowered = job.lowered(job.scene())
     row("scene built and lowered", f"{time.perf_counter() - begun:.3f} s")
-    loading = warm_up(build_problem(lowered.arrays, lowered.grid))
+    loading = warm_up(build_problem(lowered.arrays))
     row("kernel compiled or loaded", f"{loading:.3f} s")
     times: dict[int, list[float]] = {1: [], 2: []}
     for _ in range(options.repeats):

@@ -18,8 +18,9 @@ from tcs.files.quantities import MAP_STEP
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.kernel.postures import free_postures, measures, tool_poses
 from tcs.kernel.problem import Problem, build_problem
-from tcs.kernel.scores import REACHED, Scores
-from tcs.kernel.sweep import gripper_contacts, score_slice
+from tcs.kernel.rows import Rows, single_row
+from tcs.kernel.scores import REACHED, new_scores
+from tcs.kernel.sweep import gripper_contacts, score_rows
 from tcs.kernel.workspace import new_workspace
 from tcs.model.grid import Axis, Grid
 from tcs.model.robots import RobotFile, load_robot
@@ -102,7 +103,7 @@ class Reach:
         axis = Axis("torso", "m", float(self.torso_heights[0]), step, len(self.torso_heights))
         fixed = (Axis(name, unit, 0.0, 0.0, 1) for name, unit in _FIXED_AXES)
         self.lowered: LoweredScene = lower(self.scene, None, Grid((*fixed, axis)))
-        self._problem = build_problem(self.lowered.arrays, self.lowered.grid, measure)
+        self._problem = build_problem(self.lowered.arrays, measure)
         self.R_BA = self.lowered.arrays.arm_base_R[below]
         """Orientation of the arm base A in B at `torso_height`, shape (3, 3)."""
         self.p_BA = self.lowered.arrays.arm_base_p[below]
@@ -168,14 +169,14 @@ class Reach:
             jobs: Number of threads; the results do not depend on it.
             on_progress: Called with the number of poses done and of all.
         """
-        problem = self._at(self.level if level is None else level)
+        at = single_row(torso=self.level if level is None else level)
         count = len(p_BT)
         solved = Solved(
             np.zeros(count, np.bool_), np.zeros(count, np.float32), np.zeros((count, 7), np.float32)
         )
         parts = [slice(i, min(i + _SLICE, count)) for i in range(0, count, _SLICE)]
         done = 0
-        runs = (delayed(_solve_part)(problem, R_BT, p_BT, part, solved) for part in parts)
+        runs = (delayed(_solve_part)(self._problem, at, R_BT, p_BT, part, solved) for part in parts)
         # Threads suffice, as the kernel releases the interpreter lock.
         for size in Parallel(jobs, "threading", return_as="generator_unordered")(runs):
             done += size
@@ -210,12 +211,13 @@ class Reach:
             joints: Arm joints [rad], shape (n, 7).
             level: Index of the torso height.
         """
-        problem = self._at(level)
         R_AT, p_AT = self.tool_poses(joints)
-        R_BA, p_BA = problem.base_R[0], problem.base_p[0]
-        problem = _with_goals(problem, R_BA @ R_AT, p_AT @ R_BA.T + p_BA)
+        R_BA, p_BA = self._problem.base_R[level], self._problem.base_p[level]
+        problem = _with_goals(self._problem, R_BA @ R_AT, p_AT @ R_BA.T + p_BA)
         free = np.zeros(len(joints), np.bool_)
-        free_postures(problem, new_workspace(problem), 0, _writable(joints), free)
+        free_postures(
+            problem, new_workspace(problem), single_row(torso=level), _writable(joints), free
+        )
         return free
 
     def free_torso_heights(self, joints: FloatArray, *, jobs: int = 1) -> NDArray[np.uint32]:
@@ -238,33 +240,20 @@ class Reach:
             bits[part] |= of_level
         return bits
 
-    def _at(self, level: int) -> Problem:
-        """Return the problem with one torso level."""
-        part = slice(level, level + 1)
-        p = self._problem
-        kept: Any = {
-            name: getattr(p, name)[part].copy()
-            for name in (
-                *("base_R", "base_p", "body", "body_A", "body_spheres"),
-                *("rest", "rest_spheres"),
-            )
-        }
-        return p._replace(**kept, torso_levels=1)
-
 
 def _solve_part(
-    problem: Problem, R_BT: FloatArray, p_BT: FloatArray, part: slice, solved: Solved
+    problem: Problem,
+    at: Rows,
+    R_BT: FloatArray,
+    p_BT: FloatArray,
+    part: slice,
+    solved: Solved,
 ) -> int:
     """Solve a slice of the poses into its rows of `solved`; return their number."""
     problem = _with_goals(problem, R_BT[part], p_BT[part])
     count: int = part.stop - part.start
-    scores = Scores(
-        np.empty((1, count), np.uint8),
-        np.empty((1, count), np.int32),
-        np.zeros((1, count), np.float32),
-        np.zeros((1, count, 7), np.float32),
-    )
-    score_slice(problem, gripper_contacts(problem), 0, 1, scores)
+    scores = new_scores(1, count)
+    score_rows(problem, gripper_contacts(problem), at, scores)
     solved.reached[part] = scores.reason[0] == REACHED
     solved.manipulability[part] = scores.dexterity[0]
     solved.joints[part] = scores.joints[0]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,8 +16,9 @@ from tcs.errors import SelectionError, TaskError
 from tcs.files.quantities import ANGLE, POSITION
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.kernel.problem import build_problem
-from tcs.kernel.scores import BODY_BLOCKED, REACHED, Scores
-from tcs.kernel.sweep import gripper_contacts, score_slice
+from tcs.kernel.rows import single_row
+from tcs.kernel.scores import BODY_BLOCKED, REACHED, new_scores
+from tcs.kernel.sweep import gripper_contacts, score_rows
 from tcs.model.grid import Axis, Grid
 from tcs.model.robots import RobotFile, load_robot
 from tcs.model.scene import EnvironmentFile, LoweredScene, Scene, SceneSpec, load_environment, lower
@@ -162,16 +162,7 @@ class Surroundings:
     ) -> tuple[bool, BoolArray]:
         """Return whether the body is in contact at a base pose in W, and the reached tool poses."""
         lowered = self._lowered(torso_height)
-        x, y, yaw = (np.array([value]) for value in base_pose)
-        grid = lowered.grid._replace(base_x=x, base_y=y, base_yaw=yaw)
         arrays = lowered.arrays._replace(goal_R=R_WT[None], goal_p=p_WT[None])
-        problem = build_problem(arrays, grid)
-        count = len(p_WT)
-        scores: Any = Scores(
-            np.empty((1, count), np.uint8),
-            np.empty((1, count), np.int32),
-            np.zeros((1, count), np.float32),
-            np.zeros((1, count, 7), np.float32),
-        )
-        score_slice(problem, gripper_contacts(problem), 0, 1, scores)
+        problem, scores = build_problem(arrays), new_scores(1, len(p_WT))
+        score_rows(problem, gripper_contacts(problem), single_row(*base_pose), scores)
         return bool(np.any(scores.reason == BODY_BLOCKED)), scores.reason[0] == REACHED

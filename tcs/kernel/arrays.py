@@ -8,6 +8,7 @@ the z axis of `Li` and `X_AL1..7` follow from `Chain` alone.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -162,3 +163,14 @@ class GridArrays(NamedTuple):
     """Values of base yaw [rad], shape (nyaw,)."""
     torso_levels: int
     """Number of torso levels."""
+
+    @property
+    def shape(self) -> tuple[int, int, int, int, int]:
+        """Number of values along each axis, in the flat order."""
+        base = (self.base_x.size, self.base_y.size, self.base_yaw.size)
+        return (self.environment_states, *base, self.torso_levels)
+
+    @property
+    def size(self) -> int:
+        """Number of configurations."""
+        return math.prod(self.shape)

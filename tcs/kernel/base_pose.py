@@ -8,34 +8,39 @@ from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, jit
 from tcs.kernel.collide import BOUND, CENTRE, ROTATION, move
 from tcs.kernel.problem import Problem
+from tcs.kernel.rows import Rows
 from tcs.kernel.workspace import Workspace
 
 
 @jit
-def place_base(problem: Problem, work: Workspace, place: int) -> int:
-    """Place the base at a pose of the grid and express the environment in its frame.
+def place_base(problem: Problem, work: Workspace, rows: Rows, n: int) -> None:
+    """Place the base at the pose of a row and express the environment in its frame.
 
     Args:
-        problem: The scene and its grid.
+        problem: The scene.
         work: `R_BW`, `p_BW` and `environment_B` are filled.
-        place: Flat index over (environment state, base x, base y, base yaw).
-
-    Returns:
-        The environment state.
+        rows: The configurations.
+        n: The row.
     """
-    yaws, ys, xs = problem.base_yaw.size, problem.base_y.size, problem.base_x.size
-    yaw = problem.base_yaw[place % yaws]
-    y = problem.base_y[(place // yaws) % ys]
-    x = problem.base_x[(place // (yaws * ys)) % xs]
-    state = place // (yaws * ys * xs)
+    x, y, yaw = rows.x[n], rows.y[n], rows.yaw[n]
     c, s = np.cos(yaw), np.sin(yaw)
     R, p = work.R_BW, work.p_BW
     R[0, 0], R[0, 1], R[1, 0], R[1, 1] = c, s, -s, c
     p[0], p[1] = -(c * x + s * y), s * x - c * y
-    environment = problem.environment[state]
+    environment = problem.environment[rows.state[n]]
     for j in range(len(environment)):
         move(R, p, environment, j, work.environment_B, j)
-    return state
+
+
+@inner
+def shares_base(rows: Rows, n: int, other: int) -> bool:
+    """Return whether two rows have the same environment state and base pose."""
+    return (
+        rows.state[n] == rows.state[other]
+        and rows.x[n] == rows.x[other]
+        and rows.y[n] == rows.y[other]
+        and rows.yaw[n] == rows.yaw[other]
+    )
 
 
 @inner

@@ -16,6 +16,7 @@ from tcs.kernel.contacts import (
 from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.kinematics import tool_pose
 from tcs.kernel.problem import Problem
+from tcs.kernel.rows import Rows
 from tcs.kernel.views import unowned
 from tcs.kernel.workspace import Workspace
 
@@ -51,28 +52,29 @@ def measures(owned_problem: Problem, q: FloatArray, value: FloatArray) -> None:
 
 @jit
 def free_postures(
-    owned_problem: Problem, owned_work: Workspace, torso: int, q: FloatArray, free: BoolArray
+    owned_problem: Problem, owned_work: Workspace, owned_row: Rows, q: FloatArray, free: BoolArray
 ) -> None:
     """Fill whether the arm touches neither the environment nor the robot itself at given postures.
 
-    The base is at the first base pose of the problem's grid. Goal i of the first environment state
-    must be the tool pose of posture i. Base and torso are not checked against the environment.
+    Goal i must be the tool pose of posture i. Base and torso are not checked against the
+    environment.
 
     Args:
-        owned_problem: The scene, its goals and its grid.
+        owned_problem: The scene and its goals.
         owned_work: Scratch.
-        torso: Torso level.
+        owned_row: The initial configuration.
         q: Joint angles [rad], shape (n, 7).
         free: Filled, shape (n,).
     """
-    problem, work = unowned(owned_problem), unowned(owned_work)
-    place_base(problem, work, HERE)
+    problem, work, row = unowned(owned_problem), unowned(owned_work), unowned(owned_row)
+    state, torso = row.state[0], row.torso[0]
+    place_base(problem, work, row, 0)
     environment_in_arm_base(problem, work, torso)
     body_A = problem.body_A[torso]
     work.last[0] = -1
     for i in range(len(q)):
         free[i] = False
-        if gripper_environment_contact(problem, work, HERE, i) != NO_CONTACT:
+        if gripper_environment_contact(problem, work, state, i) != NO_CONTACT:
             continue
         tool_pose(
             problem.chain_R, problem.chain_p, q[i], work.link_R, work.link_p, work.R_AG, work.p_AG

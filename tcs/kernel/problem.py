@@ -1,4 +1,4 @@
-"""Scene arrays arranged for speed, as the compiled sweep reads them."""
+"""Scene arrays arranged for speed, as compiled code reads them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from tcs.kernel.arrays import (
     BoolArray,
     Chain,
     FloatArray,
-    GridArrays,
     IntArray,
     SceneArrays,
     Shapes,
@@ -31,7 +30,7 @@ TOUCH = 1e-9
 
 
 class Problem(NamedTuple):
-    """One scene, its goals and its grid.
+    """One scene and its goals, in some environment states and at some torso levels.
 
     The robot's shapes are grouped by body: the rows of shapes are followed by those of
     `ShapeGroups`. A gap of a box is the greatest gap of its shapes.
@@ -112,12 +111,6 @@ class Problem(NamedTuple):
     turn: FloatArray
     """Unit axis in T about which all goals leave the tool free to rotate, if an arm of five joints
     depends on it, else zeros, shape (3,)."""
-    base_x: FloatArray
-    """As in `GridArrays`, also the fields below."""
-    base_y: FloatArray
-    base_yaw: FloatArray
-    torso_levels: int
-    environment_states: int
     distances: DistanceTables
     """Tables of distances of bodies of the robot."""
     rest: FloatArray
@@ -127,12 +120,11 @@ class Problem(NamedTuple):
     """The bounding sphere of each, as a packed shape in B, shape (torso levels, postures, 17)."""
 
 
-def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_MEASURE) -> Problem:
-    """Return `scene` and `grid` arranged for the kernel.
+def build_problem(scene: SceneArrays, measure: str = DEFAULT_MEASURE) -> Problem:
+    """Return `scene` arranged for the kernel.
 
     Args:
         scene: The scene and its goals.
-        grid: The initial configurations.
         measure: Name of the dexterity measure to maximise.
 
     Raises:
@@ -201,11 +193,6 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
         goal_p=_own(scene.goal_p),
         freedom=free_goals(scene.freedom, scene.chain),
         turn=axis_left_free(scene.freedom, scene.chain),
-        base_x=_own(grid.base_x),
-        base_y=_own(grid.base_y),
-        base_yaw=_own(grid.base_yaw),
-        torso_levels=grid.torso_levels,
-        environment_states=grid.environment_states,
         distances=arranged(scene.distances, robot_bodies),
         rest=rest,
         rest_spheres=rest_spheres,
@@ -223,7 +210,6 @@ def with_environment(problem: Problem, scene: SceneArrays) -> Problem:
         environment=pack(scene.environment),
         goal_R=_own(scene.goal_R),
         goal_p=_own(scene.goal_p),
-        environment_states=len(scene.goal_p),
     )
 
 

@@ -1,4 +1,4 @@
-"""Scores of a slice of the grid, and the codes of reasons."""
+"""Scores of configurations, and the codes of reasons."""
 
 from __future__ import annotations
 
@@ -7,14 +7,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tcs.kernel.arrays import IntArray
+
 REACHED, TOO_FAR, JOINT_LIMITS, BODY_BLOCKED = 0, 1, 2, 3
 GRIPPER_BLOCKED_BY_ENVIRONMENT, GRIPPER_BLOCKED_BY_ROBOT, ARM_BLOCKED = 4, 5, 6
 APPROACH_LIMITS, APPROACH_BLOCKED = 8, 9
 """Reasons, equal to the values of `tcs.placement.tables.Reason`."""
 
 
+JOINTS = 7
+"""Joint angles of a posture."""
+
+
 class Scores(NamedTuple):
-    """Scores of a slice; row 0 is the first configuration of the slice."""
+    """Scores of configurations, a row for each."""
 
     reason: NDArray[np.uint8]
     """Codes of reasons, shape (n, goals)."""
@@ -25,3 +31,24 @@ class Scores(NamedTuple):
     joints: NDArray[np.float32]
     """Joint angles of the best solution [rad], unchanged where not reached, shape
     (n, goals, 7)."""
+
+    def part(self, rows: slice) -> Scores:
+        """Return the scores of consecutive rows, as views."""
+        return Scores(
+            self.reason[rows], self.contact[rows], self.dexterity[rows], self.joints[rows]
+        )
+
+    def put(self, rows: IntArray | NDArray[np.bool_], found: Scores) -> None:
+        """Replace the scores of some rows."""
+        self.reason[rows], self.contact[rows] = found.reason, found.contact
+        self.dexterity[rows], self.joints[rows] = found.dexterity, found.joints
+
+
+def new_scores(rows: int, goals: int) -> Scores:
+    """Return scores to be filled: dexterity and joints are 0 where nothing is reached."""
+    return Scores(
+        reason=np.empty((rows, goals), np.uint8),
+        contact=np.empty((rows, goals), np.int32),
+        dexterity=np.zeros((rows, goals), np.float32),
+        joints=np.zeros((rows, goals, JOINTS), np.float32),
+    )

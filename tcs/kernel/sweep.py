@@ -1,11 +1,16 @@
-"""Score every initial configuration in a slice of the grid at every goal."""
+"""Score initial configurations at every goal."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
-from tcs.kernel.base_pose import environment_in_arm_base, goal_in_arm_base, place_base
+from tcs.kernel.base_pose import (
+    environment_in_arm_base,
+    goal_in_arm_base,
+    place_base,
+    shares_base,
+)
 from tcs.kernel.cache import inner, jit
 from tcs.kernel.contacts import (
     BASE_FIXED,
@@ -21,6 +26,7 @@ from tcs.kernel.freedom.forms import FEWEST_JOINTS, pose_of
 from tcs.kernel.freedom.goals import FreeGoals
 from tcs.kernel.freedom.search import score_free
 from tcs.kernel.problem import Problem
+from tcs.kernel.rows import Rows
 from tcs.kernel.scores import (
     BODY_BLOCKED,
     GRIPPER_BLOCKED_BY_ENVIRONMENT,
@@ -107,44 +113,39 @@ def _look_further(owned_problem: Problem, owned_work: Workspace, blocked: BoolAr
                 blocked[s, g] = gripper_contact_at(problem, work, s, R, p) != NO_CONTACT
 
 
-def score_slice(
-    problem: Problem, grippers: IntArray, start: int, stop: int, scores: Scores
-) -> None:
-    """Score the configurations start <= h < stop in the flat order of the grid.
+def score_rows(problem: Problem, grippers: IntArray, rows: Rows, scores: Scores) -> None:
+    """Score configurations.
 
     Args:
-        problem: The scene, its goals and its grid.
+        problem: The scene and its goals.
         grippers: From `gripper_contacts`.
-        start: First configuration.
-        stop: One after the last configuration.
-        scores: Filled; every array has stop - start rows. `dexterity` and `joints` are written only
-            where a goal is reached, `reason` and `contact` everywhere.
+        rows: The configurations.
+        scores: Filled; every array has a row for each of `rows`. `dexterity` and `joints` are
+            written only where a goal is reached, `reason` and `contact` everywhere.
     """
     # Allocated here to outlive the call: the compiled code takes unowned views of these arrays.
     work, solver, free = new_workspace(problem), new_solver(problem), freedom_if_any(problem)
-    _score_slice(problem, free, work, solver, grippers, start, stop, scores)
+    _score_rows(problem, free, work, solver, grippers, rows, scores)
 
 
 @jit
-def _score_slice(
+def _score_rows(
     owned_problem: Problem,
     free: FreeGoals | None,
     owned_work: Workspace,
     owned_solver: Solver,
     grippers: IntArray,
-    start: int,
-    stop: int,
+    owned_rows: Rows,
     owned_scores: Scores,
 ) -> None:
     problem, scores = unowned(owned_problem), unowned(owned_scores)
-    work, solver = unowned(owned_work), unowned(owned_solver)
+    work, solver, rows = unowned(owned_work), unowned(owned_solver), unowned(owned_rows)
     rounded = np.empty(7)
-    place, base_code, state = -1, NO_CONTACT, 0
-    for h in range(start, stop):
-        row, torso = h - start, h % problem.torso_levels
-        if h // problem.torso_levels != place:
-            place = h // problem.torso_levels
-            state = place_base(problem, work, place)
+    base_code = NO_CONTACT
+    for row in range(len(rows.state)):
+        state, torso = rows.state[row], rows.torso[row]
+        if row == 0 or not shares_base(rows, row, row - 1):
+            place_base(problem, work, rows, row)
             base_code = base_contact(problem, work, BASE_FIXED, BASE_FIXED)
         code = base_code
         if code == NO_CONTACT:

@@ -13,6 +13,7 @@ from tcs.kernel.approach.scene import LineScene, approach_scene
 from tcs.kernel.approach.sweep import ApproachLines, approach_spline
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.problem import Problem, build_problem
+from tcs.kernel.rows import rows_at
 from tcs.model.scene import LoweredScene, NeighbourList, Scene, goal_poses
 from tcs.motion.curves import Curve
 from tcs.motion.recheck import false_pieces
@@ -79,6 +80,7 @@ class ApproachScene:
 
     job: Job
     scene: Scene
+    lowered: LoweredScene
     problem: Problem
     lines: ApproachLines
     neighbours: NeighbourList
@@ -97,9 +99,9 @@ class ApproachScene:
         Raises:
             RobotError: If a velocity limit is unknown.
         """
-        problem = build_problem(lowered.arrays, lowered.grid)
+        problem = build_problem(lowered.arrays)
         neighbours, around = NeighbourList(scene), approach_scene(problem)
-        return cls(job, scene, problem, approach_lines(job), neighbours, around)
+        return cls(job, scene, lowered, problem, approach_lines(job), neighbours, around)
 
     def at(self, values: FloatArray, observed: Mapping[str, float]) -> Self:
         """Return the same with one configuration, on or off the grid.
@@ -125,7 +127,8 @@ class ApproachScene:
             goal: Number of the goal.
             q: Joint angles at the goal [rad], shape (7,).
         """
-        spline = approach_spline(self.problem, self.lines, number, goal, q, self.around)
+        row = rows_at(self.lowered.grid, [number])
+        spline = approach_spline(self.problem, self.lines, row, goal, q, self.around)
         if spline is None:
             return None
         points, tangents = spline

@@ -19,6 +19,7 @@ from tcs.kernel.motion.scene import (
     MotionScene,
     MotionWorkspace,
     carriers,
+    goal_from_arm_base,
     new_motion_workspace,
     placed,
     torso_scene,
@@ -26,6 +27,7 @@ from tcs.kernel.motion.scene import (
 )
 from tcs.kernel.motion.trees import Trees, new_trees
 from tcs.kernel.problem import Problem, build_problem
+from tcs.kernel.rows import rows_at
 from tcs.model.grid import Axis, Grid, InitialConfiguration
 from tcs.model.scene import LoweredScene, Scene, lower
 from tcs.motion.keep_out import with_keep_out
@@ -104,7 +106,7 @@ class StopGrid:
             scene=scene,
             configurations=grid,
             lowered=lowered,
-            problem=build_problem(lowered.arrays, lowered.grid),
+            problem=build_problem(lowered.arrays),
             rests=np.array(list(job.spec.robot.rest_postures().values())),
             velocity=np.array(velocity),
             acceleration=np.array(acceleration),
@@ -118,7 +120,7 @@ class StopGrid:
         """
         if self.job.task.keep_out:
             lowered = with_keep_out(lowered, self.job.task)
-        problem = build_problem(lowered.arrays, lowered.grid)
+        problem = build_problem(lowered.arrays)
         return replace(self, lowered=lowered, problem=problem)
 
     def stop(self, configuration: int, trees: Trees) -> Stop:
@@ -128,15 +130,16 @@ class StopGrid:
             configuration: Flat index among those that are lowered.
             trees: Memory of the planner, with its random state.
         """
-        torso = configuration % self.problem.torso_levels
+        row = rows_at(self.lowered.grid, [configuration])
+        torso = int(row.torso[0])
         if torso not in self.scenes:
             self.scenes[torso] = self._scenes_at(torso)
         paths, straight = self.scenes[torso]
-        motion = placed(paths, self.problem, configuration)
+        motion = placed(paths, self.problem, row)
         work = new_motion_workspace(motion)
         lines, line_work = motion, work
         if straight is not paths:
-            lines = placed(straight, self.problem, configuration)
+            lines = placed(straight, self.problem, row)
             line_work = new_motion_workspace(lines)
         return Stop(self, configuration, motion, work, lines, line_work, trees)
 
@@ -251,23 +254,8 @@ class Stop:
 
     def goal_in_arm_base(self, goal: int) -> tuple[FloatArray, FloatArray]:
         """Return the pose of a goal in the arm base A: orientation (3, 3), position (3,) [m]."""
-        problem = self.problem
-        sizes = (
-            problem.environment_states,
-            problem.base_x.size,
-            problem.base_y.size,
-            problem.base_yaw.size,
-            problem.torso_levels,
-        )
-        state, x, y, yaw, torso = (int(i) for i in np.unravel_index(self.number, sizes))
-        angle = problem.base_yaw[yaw]
-        c, s = np.cos(angle), np.sin(angle)
-        R_WB = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        p_WB = np.array([problem.base_x[x], problem.base_y[y], 0.0])
-        R_WA = R_WB @ problem.base_R[torso]
-        p_WA = p_WB + R_WB @ problem.base_p[torso]
-        R_AG = np.ascontiguousarray(R_WA.T @ problem.goal_R[state, goal])
-        return R_AG, R_WA.T @ (problem.goal_p[state, goal] - p_WA)
+        row = rows_at(self.grid.lowered.grid, [self.number])
+        return goal_from_arm_base(self.problem, row, goal)
 
     def place(self, values: dict[str, float]) -> None:
         """Set the live scene to this stop, the arm to its rest posture.

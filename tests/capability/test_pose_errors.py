@@ -11,8 +11,9 @@ from tcs.capability.pose_errors import displaced
 from tcs.capability.surroundings import Surroundings
 from tcs.errors import TaskError, TcsError
 from tcs.kernel.problem import build_problem
-from tcs.kernel.scores import Scores
-from tcs.kernel.sweep import gripper_contacts, score_slice
+from tcs.kernel.rows import grid_rows
+from tcs.kernel.scores import new_scores
+from tcs.kernel.sweep import gripper_contacts, score_rows
 from tests.capability.test_surroundings import boxes
 from tests.kernel.judge import compare
 
@@ -87,14 +88,8 @@ def test_displaced_scenes_agree_with_the_plain_loop_reference(post, best):
             base_yaw=np.array([best.yaw + of_base[2]]),
         )
         count = len(p)
-        scores = Scores(
-            np.empty((1, count), np.uint8),
-            np.empty((1, count), np.int32),
-            np.zeros((1, count), np.float32),
-            np.zeros((1, count, 7), np.float32),
-        )
-        problem = build_problem(arrays, grid)
-        score_slice(problem, gripper_contacts(problem), 0, 1, scores)
+        problem, scores = build_problem(arrays), new_scores(1, count)
+        score_rows(problem, gripper_contacts(problem), grid_rows(grid), scores)
         compare(arrays, grid, scores, [(0, g) for g in range(count)])
         grasps = replace(moved, positions=tuple(
             replace(one, grasps=tuple(replace(g, pre_grasps=()) for g in one.grasps))

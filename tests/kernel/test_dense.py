@@ -7,6 +7,7 @@ import pytest
 
 from tcs.kernel.analytic.solver import outside_solver
 from tcs.kernel.problem import build_problem
+from tcs.kernel.rows import rows_at
 from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED
 from tcs.kernel.verification import dense, reference_pairs
 from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan, dense_scans
@@ -31,11 +32,11 @@ def sample(rng, chosen, number):
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_scan_finds_what_the_search_found_or_better(lowered, seed, rng):
     scene, grid = scene_of(seed, lowered)
-    scores, problem = scores_of(scene, grid), build_problem(scene, grid)
+    scores, problem = scores_of(scene, grid), build_problem(scene)
     shortfalls = []
     for h, g in sample(rng, scores.reason == REACHED, 12):
         q = np.full(7, np.nan)
-        value = dense_scan(problem, h, g, DENSE_SAMPLES, q)
+        value = dense_scan(problem, rows_at(grid, [h]), g, DENSE_SAMPLES, q)
         # Only the search finds free intervals narrower than the scan's 1/32 degree.
         assert value >= 0.0
         # 1/32 degree is 5e-4 rad, and the isotropy of these arms changes by up to 2 per radian.
@@ -48,8 +49,8 @@ def test_the_scan_finds_what_the_search_found_or_better(lowered, seed, rng):
 @pytest.mark.parametrize("seed", range(4))
 def test_no_branch_is_solved_where_the_elbow_does_not_span_the_distance(lowered, seed, rng):
     # The scan leaves out what this tells apart: so it must never leave out a solution.
-    scene, grid = scene_of(seed, lowered)
-    arm, spans_any = build_problem(scene, grid).arm, dense._elbow_spans_any.py_func
+    scene, _ = scene_of(seed, lowered)
+    arm, spans_any = build_problem(scene).arm, dense._elbow_spans_any.py_func
     angles = np.linspace(-np.pi, np.pi, 512)
     table = np.stack([angles, np.cos(angles), np.sin(angles)])
     left_out = solved = 0
@@ -71,7 +72,7 @@ def test_no_branch_is_solved_where_the_elbow_does_not_span_the_distance(lowered,
 def test_pairs_are_scanned_together_as_alone(lowered, rng, outside):
     # Scratch memory is shared: what one pair leaves in it must not reach the next.
     scene, grid = scene_of(3, lowered)
-    scores, problem = scores_of(scene, grid), build_problem(scene, grid)
+    scores, problem = scores_of(scene, grid), build_problem(scene)
     if outside:
         problem = problem._replace(arm=outside_solver(scene.chain))
     chosen = [sample(rng, scores.reason == r, 2) for r in (REACHED, JOINT_LIMITS, ARM_BLOCKED)]
@@ -80,7 +81,7 @@ def test_pairs_are_scanned_together_as_alone(lowered, rng, outside):
     joints, alone = np.full((len(pairs), 7), np.nan), np.full((len(pairs), 7), np.nan)
     values = dense_scans(problem, pairs, DENSE_SAMPLES, joints)
     for (h, g), value, q in zip(pairs, values, alone, strict=True):
-        assert dense_scan(problem, h, g, DENSE_SAMPLES, q) == value
+        assert dense_scan(problem, rows_at(grid, [h]), g, DENSE_SAMPLES, q) == value
     assert np.any(values >= 0.0)
     np.testing.assert_array_equal(joints[values >= 0.0], alone[values >= 0.0])
 
@@ -88,10 +89,10 @@ def test_pairs_are_scanned_together_as_alone(lowered, rng, outside):
 @pytest.mark.parametrize("seed", SEEDS)
 def test_what_the_scan_finds_is_true(lowered, seed, rng):
     scene, grid = scene_of(seed, lowered)
-    scores, problem = scores_of(scene, grid), build_problem(scene, grid)
+    scores, problem = scores_of(scene, grid), build_problem(scene)
     for h, g in sample(rng, scores.reason == REACHED, 5):
         q = np.full(7, np.nan)
-        value = dense_scan(problem, h, g, 2000, q)
+        value = dense_scan(problem, rows_at(grid, [h]), g, 2000, q)
         if value >= 0.0:
             # The reference's chain of rotations rounds differently, by 1e-15.
             eased = scene._replace(margin=scene.margin - 1e-9, self_margin=scene.self_margin - 1e-9)
@@ -106,12 +107,12 @@ def test_the_search_misses_little_that_the_scan_finds(lowered, rng):
     reached = missed = scanned = candidates = 0
     for seed in SEEDS:
         scene, grid = scene_of(seed, lowered)
-        scores, problem = scores_of(scene, grid), build_problem(scene, grid)
+        scores, problem = scores_of(scene, grid), build_problem(scene)
         reached += np.sum(scores.reason == REACHED)
         blocked = np.isin(scores.reason, (JOINT_LIMITS, ARM_BLOCKED))
         candidates += np.sum(blocked)
         for h, g in sample(rng, blocked, 40):
-            missed += dense_scan(problem, h, g, DENSE_SAMPLES, np.empty(7)) >= 0.0
+            missed += dense_scan(problem, rows_at(grid, [h]), g, DENSE_SAMPLES, np.empty(7)) >= 0.0
             scanned += 1
     assert scanned > 200
     assert reached / (reached + candidates * missed / scanned) > 0.98
@@ -119,8 +120,8 @@ def test_the_search_misses_little_that_the_scan_finds(lowered, rng):
 
 def test_nothing_is_found_too_far_away(lowered):
     scene, grid = scene_of(0, lowered)
-    problem = build_problem(scene._replace(goal_p=scene.goal_p + 10.0), grid)
-    assert dense_scan(problem, 0, 0, 500, np.empty(7)) == -1.0
+    problem = build_problem(scene._replace(goal_p=scene.goal_p + 10.0))
+    assert dense_scan(problem, rows_at(grid, [0]), 0, 500, np.empty(7)) == -1.0
 
 
 @pytest.mark.parametrize(
@@ -137,7 +138,7 @@ def test_every_number_of_samples_is_scanned_to_its_end(lowered, samples, spheric
     angle = float(scores.joints[h, g, free])
     lower, upper = chain.lower.copy(), chain.upper.copy()
     lower[free], upper[free] = angle - 0.5, angle
-    problem = build_problem(scene._replace(chain=chain._replace(lower=lower, upper=upper)), grid)
+    problem = build_problem(scene._replace(chain=chain._replace(lower=lower, upper=upper)))
     q = np.full(7, np.nan)
-    assert dense_scan(problem, h, g, samples, q) >= 0.0
+    assert dense_scan(problem, rows_at(grid, [h]), g, samples, q) >= 0.0
     assert q[free] <= angle

@@ -14,6 +14,7 @@ from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.five_joints.turned import turned_arm, turned_chain
 from tcs.kernel.freedom.goals import free_goals
 from tcs.kernel.problem import build_problem
+from tcs.kernel.rows import rows_at
 from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED, TOO_FAR
 from tcs.kernel.six_joints.solutions import six_joint_solutions
 from tcs.kernel.solvers import new_solver
@@ -92,9 +93,9 @@ def test_newtons_method_finds_no_further_posture(rng):
 
 def test_the_measure_is_of_the_five_directions_that_goals_prescribe(rng):
     chain = five_joint_chain(SEED)
-    scene, grid = scene_of(TURN, goals=1), toy_grid(states=1)
+    scene = scene_of(TURN, goals=1)
     for measure in MEASURES:
-        problem = build_problem(scene, grid, measure)
+        problem = build_problem(scene, measure)
         q, (R, _) = drawn(rng, chain)
         J = prescribed(jacobian(chain, q), R @ np.array(AXIS))
         assert J.shape == (5, 5)
@@ -111,7 +112,7 @@ def test_the_isotropy_vanishes_where_the_free_rotation_replaces_a_joint():
     scene = toy_scene(chain, SEED, goals=1, states=1)._replace(
         freedom=Freedom(axis=(0.0, 0.0, 1.0), rotates=True).row()[None]
     )
-    problem = build_problem(scene, toy_grid(states=1))
+    problem = build_problem(scene)
     assert measure_at(problem, np.linspace(0.0, 0.6, 7)) < 1e-3
     with pytest.raises(ArmClassError, match=r"adds nothing.*another axis"):
         new_solver(problem)
@@ -120,7 +121,7 @@ def test_the_isotropy_vanishes_where_the_free_rotation_replaces_a_joint():
 def test_goals_without_a_free_rotation_are_refused():
     scene = toy_scene(five_joint_chain(SEED), SEED, goals=1, states=1)
     with pytest.raises(ArmClassError, match="five joints cannot take every tool pose"):
-        new_solver(build_problem(scene, toy_grid(states=1)))
+        new_solver(build_problem(scene))
 
 
 def test_kernel_agrees_with_reference(rng):
@@ -140,13 +141,13 @@ def test_kernel_agrees_with_reference(rng):
 def test_dense_scan_finds_what_the_sweep_finds(tilt, rng, monkeypatch):
     monkeypatch.setattr("tcs.kernel.verification.free_scans.POSES", 100)
     scene, grid = scene_of(Freedom(axis=AXIS, rotates=True, tilt=tilt)), toy_grid(states=1)
-    problem, scores = build_problem(scene, grid), scores_of(scene, grid)
+    problem, scores = build_problem(scene), scores_of(scene, grid)
     sampled = np.isin(scores.reason, (REACHED, JOINT_LIMITS, ARM_BLOCKED, TOO_FAR))
     for h, g in stratified(rng, np.where(sampled, scores.reason, 99), 3):
         if not sampled[h, g]:
             continue
         q = np.full(7, np.nan)
-        value = dense_scan(problem, h, g, 0, q)
+        value = dense_scan(problem, rows_at(grid, [h]), g, 0, q)
         if value < 0.0 and tilt > 0.0:
             continue  # few poses are drawn: none need reach
         assert (value >= 0.0) == (scores.reason[h, g] == REACHED)

@@ -16,6 +16,7 @@ from tcs.kernel.freedom.forms import COLUMNS
 from tcs.kernel.freedom.goals import free_goals
 from tcs.kernel.freedom.reach import wrist_reach
 from tcs.kernel.problem import build_problem
+from tcs.kernel.rows import grid_rows, rows_at
 from tcs.kernel.scores import ARM_BLOCKED, BODY_BLOCKED, JOINT_LIMITS, REACHED, TOO_FAR
 from tcs.kernel.sweep import blocked_grippers, gripper_contacts
 from tcs.kernel.verification import free_scans
@@ -143,23 +144,25 @@ def test_dense_scan_finds_no_further_solution(name, rng, monkeypatch):
     monkeypatch.setattr(free_scans, "ANGLES", 72)
     monkeypatch.setattr(free_scans, "POSES", 100)
     scene, grid = scene_with(FREEDOMS[name]), toy_grid(states=1)
-    scores, problem = scores_of(scene, grid), build_problem(scene, grid)
+    scores, problem = scores_of(scene, grid), build_problem(scene)
     never = np.isin(scores.reason, (JOINT_LIMITS, ARM_BLOCKED, TOO_FAR))
     pairs = np.argwhere(never)
     pairs = pairs[rng.choice(len(pairs), min(4, len(pairs)), replace=False)]
-    assert np.all(dense_scans(problem, pairs, 800, np.empty((len(pairs), 7))) < 0.0)
+    assert np.all(
+        dense_scans(problem, grid_rows(grid), pairs, 800, np.empty((len(pairs), 7))) < 0.0
+    )
     found = np.argwhere(scores.reason == REACHED)[:2]
-    values = dense_scans(problem, found, 800, np.empty((len(found), 7)))
+    values = dense_scans(problem, grid_rows(grid), found, 800, np.empty((len(found), 7)))
     assert np.all(values > 0.0)
 
 
 def test_a_gripper_is_blocked_where_all_its_poses_are():
-    scene, grid = scene_with(FREEDOMS["rotation"], goals=4), toy_grid(states=1)
-    problem = build_problem(scene, grid)
+    scene = scene_with(FREEDOMS["rotation"], goals=4)
+    problem = build_problem(scene)
     free, every, samples = problem.freedom, [], []
     for g in range(4):
         poses = [at_offset(scene, g, offset(free.form[g], u)) for u in free.u]
-        codes = [gripper_contacts(build_problem(posed, grid))[0, g] for posed in poses]
+        codes = [gripper_contacts(build_problem(posed))[0, g] for posed in poses]
         every.append(np.all(np.array(codes) != NO_CONTACT))
         samples.append(np.all(np.array(codes[: free.first[1]]) != NO_CONTACT))
     of_samples = gripper_contacts(problem)[0] != NO_CONTACT
@@ -169,7 +172,7 @@ def test_a_gripper_is_blocked_where_all_its_poses_are():
 
 
 def test_a_free_pose_between_blocked_samples_counts(monkeypatch):
-    problem = build_problem(scene_with(FREEDOMS["rotation"], goals=4), toy_grid(states=1))
+    problem = build_problem(scene_with(FREEDOMS["rotation"], goals=4))
     expected = blocked_grippers(problem)
     assert not np.all(expected)
     codes = np.zeros_like(gripper_contacts(problem))
@@ -398,7 +401,7 @@ def test_a_pose_free_of_contact_among_blocked_ones_is_found():
     chain = six_joint_chain("spherical wrist", 10)
     scene, grid = toy_scene(chain, 10, obstacles=12, goals=3, states=1), toy_grid(states=1)
     scene = scene._replace(freedom=np.repeat(FREEDOMS["orientation"].row()[None], 3, axis=0))
-    scores, problem = scores_of(scene, grid), build_problem(scene, grid)
+    scores, problem = scores_of(scene, grid), build_problem(scene)
     assert np.sum(scores.reason == REACHED) > 9
     for goal in range(3):
         left = np.flatnonzero(~np.isin(scores.reason[:, goal], (REACHED, BODY_BLOCKED)))
@@ -406,7 +409,7 @@ def test_a_pose_free_of_contact_among_blocked_ones_is_found():
         posed = free_scans.at_poses(problem, 0, goal)
         for h in left:
             # Goals of the scan are poses without freedom.
-            assert free_scans.best_score(posed, int(h))[0] < 0.0
+            assert free_scans.best_score(posed, rows_at(grid, [h]))[0] < 0.0
 
 
 def test_samples_of_any_orientation_leave_no_wide_gap():

@@ -13,7 +13,7 @@ from tcs.kernel.problem import build_problem
 from tcs.kernel.verification.constructed import random_posture
 from tcs.kernel.workspace import new_workspace, place_group, place_link
 from tests.kernel.judge import chain_of
-from tests.kernel.toy import crowded, toy_grid, toy_scene
+from tests.kernel.toy import crowded, toy_scene
 
 NONE = -1
 
@@ -67,7 +67,7 @@ def test_pair_is_the_first_that_touches(lowered, seed):
     chain, rng = chain_of(seed, lowered), np.random.default_rng(seed)
     # Shapes of one kind only would leave a case of `_seen_from` out.
     scene = crowded(toy_scene(chain, seed, obstacles=12), rng, 30)
-    problem = build_problem(scene, toy_grid())
+    problem = build_problem(scene)
     assert set(problem.environment[0, :, TYPE]) == {SPHERE, CAPSULE, BOX}
     of_arm, of_body = problem.link_groups.first, problem.body_groups.first
     every = np.arange(problem.environment.shape[1] + 1)

@@ -7,6 +7,7 @@ import pytest
 
 from tcs.kernel.arrays import SPHERE, GridArrays, SceneArrays
 from tcs.kernel.problem import build_problem
+from tcs.kernel.rows import rows_at
 from tcs.kernel.scores import REACHED
 from tcs.kernel.verification import reference_pairs
 from tcs.kernel.verification.constructed import same_branch, score_one, with_goals
@@ -52,7 +53,7 @@ def scene_of(chain, q, obstacles=(), arm=None):
 def score_of(scene, q):
     """Return the measure of the goal, which must be reached, as it is at posture q."""
     assert reference_pairs.confirms(scene, HERE, 0, 0, q)
-    scores = score_one(build_problem(scene, HERE), 0)
+    scores = score_one(build_problem(scene), rows_at(HERE, [0]))
     assert scores.reason[0, 0] == REACHED
     assert is_true(scene, HERE, 0, 0, scores.joints[0, 0])
     return scores.dexterity[0, 0]

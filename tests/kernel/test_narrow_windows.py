@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tcs.kernel.problem import build_problem
+from tcs.kernel.rows import rows_at
 from tcs.kernel.scores import REACHED
 from tcs.kernel.verification.constructed import score_one as scores_of
 from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan
@@ -30,7 +31,7 @@ STRETCHED = [(24248, 5)]
 def problem_of(task, environment, robot="pr2"):
     job = load_job(task, environment, robot)
     lowered = job.lowered(job.scene())
-    return build_problem(lowered.arrays, lowered.grid)
+    return build_problem(lowered.arrays), lowered.grid
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +66,8 @@ def test_a_window_in_which_joints_run_fast_is_found(shaving_with_tiago, h, g):
 
 @pytest.mark.parametrize(("h", "g"), THIN, ids=str)
 def test_a_window_narrower_than_the_dense_scan_is_found(shaving_with_tiago, h, g):
-    scores = scores_of(shaving_with_tiago, h)
+    problem, grid = shaving_with_tiago
+    scores = scores_of(problem, rows_at(grid, [h]))
     assert scores.reason[0, g] == REACHED
     # The dense scan may step over it; the reference judges the solution itself.
     job = load_job("shaving", "wheelchair", "tiago")
@@ -78,11 +80,12 @@ def test_a_window_of_the_stretched_arm_is_found(shaving_with_iiwa7, h, g):
     check(shaving_with_iiwa7, h, g)
 
 
-def check(problem, h, g):
+def check(scored, h, g):
     """Score one pair, and compare it with the dense scan."""
-    scores = scores_of(problem, h)
+    problem, grid = scored
+    scores = scores_of(problem, rows_at(grid, [h]))
     q = np.empty(7)
-    best = dense_scan(problem, h, g, DENSE_SAMPLES, q)
+    best = dense_scan(problem, rows_at(grid, [h]), g, DENSE_SAMPLES, q)
     assert best > 0.0
     assert scores.reason[0, g] == REACHED
     # As wide as a window is, isotropy changes by less than this across it.

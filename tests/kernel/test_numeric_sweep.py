@@ -14,6 +14,7 @@ import pytest
 from tcs.kernel.analytic.solver import is_outside
 from tcs.kernel.cache import jit_folder
 from tcs.kernel.problem import build_problem
+from tcs.kernel.rows import rows_at
 from tcs.kernel.scores import (
     ARM_BLOCKED,
     BODY_BLOCKED,
@@ -82,8 +83,7 @@ def test_goals_at_the_edge_of_the_workspace_are_reached():
     lowered = job.lowered(job.scene())
     grid = lowered.grid
     axes = grid.base_x, grid.base_y, grid.base_yaw
-    sizes = grid.environment_states, *map(len, axes), grid.torso_levels
-    state, x, y, yaw, torso = np.unravel_index(106321, sizes)
+    state, x, y, yaw, torso = np.unravel_index(106321, grid.shape)
     place = grid._replace(base_x=axes[0][[x]], base_y=axes[1][[y]], base_yaw=axes[2][[yaw]])
     found = scores_of(lowered.arrays, place)
     h, g = state * grid.torso_levels + torso, 0
@@ -122,14 +122,14 @@ def test_many_starts_find_little_more(rng):
     reached = missed = scanned = size = 0
     for seed in range(6):
         scene, grid, scores = offset_scene(seed)
-        problem = build_problem(scene, grid)
+        problem = build_problem(scene)
         assert is_outside(problem.arm)
         left = np.isin(scores.reason, (JOINT_LIMITS, ARM_BLOCKED))
         reached += np.sum(scores.reason == REACHED)
         size += np.sum(left)
         pairs = np.argwhere(left)
         for h, g in pairs[rng.choice(len(pairs), min(25, len(pairs)), replace=False)]:
-            missed += dense_scan(problem, h, g, 0, np.empty(7)) >= 0.0
+            missed += dense_scan(problem, rows_at(grid, [h]), g, 0, np.empty(7)) >= 0.0
             scanned += 1
     assert scanned > 60
     # A floor only, as for the closed form: .99 and more is measured in the real scene.
@@ -139,12 +139,12 @@ def test_many_starts_find_little_more(rng):
 @pytest.mark.parametrize("seed", range(3))
 def test_the_dense_scan_finds_what_is_reached_and_no_less_dexterous(seed, rng):
     scene, grid, scores = offset_scene(seed)
-    problem = build_problem(scene, grid)
+    problem = build_problem(scene)
     pairs = np.argwhere(scores.reason == REACHED)
     found = []
     for h, g in pairs[rng.choice(len(pairs), min(10, len(pairs)), replace=False)]:
         q = np.full(7, np.nan)
-        value = dense_scan(problem, h, g, 0, q)
+        value = dense_scan(problem, rows_at(grid, [h]), g, 0, q)
         assert value >= 0.0
         assert is_true(scene, grid, h, g, q)
         found.append(value - scores.dexterity[h, g])
@@ -155,10 +155,10 @@ def test_the_dense_scan_finds_what_is_reached_and_no_less_dexterous(seed, rng):
 @pytest.mark.parametrize("seed", range(4))
 def test_nothing_too_far_is_found_by_many_starts(seed, rng):
     scene, grid, scores = offset_scene(seed, obstacles=0)
-    problem = build_problem(scene, grid)
+    problem = build_problem(scene)
     pairs = np.argwhere(scores.reason == TOO_FAR)
     for h, g in pairs[rng.choice(len(pairs), min(6, len(pairs)), replace=False)]:
-        assert dense_scan(problem, h, g, 0, np.empty(7)) == -1.0
+        assert dense_scan(problem, rows_at(grid, [h]), g, 0, np.empty(7)) == -1.0
 
 
 def test_without_obstacles_only_the_robot_blocks():
@@ -221,7 +221,7 @@ def called(package):
         if isinstance(value, CPUDispatcher) and value.py_func.__module__ == name
         and value.signatures
     ]
-print("tcs.kernel.sweep._score_slice" in called("sweep"), called("numeric"))
+print("tcs.kernel.sweep._score_rows" in called("sweep"), called("numeric"))
 """
 
 
@@ -239,7 +239,7 @@ def test_arms_with_a_closed_form_never_compile_the_numeric_code():
     for numeric in (False, True):
         scores_of(scene, toy_grid(), numeric=numeric)
     # Machine code names all functions that were compiled into it, and its signature the solver.
-    files = [path.read_bytes() for path in jit_folder().glob("tcs.kernel.sweep._score_slice-*")]
+    files = [path.read_bytes() for path in jit_folder().glob("tcs.kernel.sweep._score_rows-*")]
     analytic = [content for content in files if b"NumericSolver" not in content]
     assert analytic
     for content in files:
@@ -249,11 +249,11 @@ def test_arms_with_a_closed_form_never_compile_the_numeric_code():
 
 def test_goals_that_leave_no_freedom_never_compile_the_search_over_it():
     scores_of(toy_scene(random_arm(np.random.default_rng(0)), 0), toy_grid())
-    files = [path.read_bytes() for path in jit_folder().glob("tcs.kernel.sweep._score_slice-*")]
+    files = [path.read_bytes() for path in jit_folder().glob("tcs.kernel.sweep._score_rows-*")]
     # Those of goals that leave some contain it, if any were scored before.
     assert any(b"10score_free" not in content for content in files)
 
 
 def test_an_arm_with_a_closed_form_is_not_outside():
     scene = toy_scene(random_arm(np.random.default_rng(0)), 0)
-    assert not is_outside(build_problem(scene, toy_grid()).arm)
+    assert not is_outside(build_problem(scene).arm)

@@ -9,6 +9,7 @@ import pytest
 
 from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.problem import build_problem
+from tcs.kernel.rows import rows_at
 from tcs.kernel.scores import GRIPPER_BLOCKED_BY_ROBOT, REACHED
 from tcs.kernel.verification.constructed import random_posture, score_one, with_goals
 from tcs.kernel.verification.free_postures import posture_contact
@@ -102,14 +103,14 @@ def test_the_kernel_agrees_with_drake_at_margins_of_its_own(spec, shaving, full_
     arrays, grid = lowered.arrays, lowered.grid
     rng = np.random.default_rng(0)
     postures = np.array([random_posture(rng, arrays.chain) for _ in range(120)])
-    problem = build_problem(with_goals(arrays, grid, 0, postures), grid)
+    problem = build_problem(with_goals(arrays, grid, 0, postures))
     work = new_workspace(problem)
     scene.place_base(where["base_x"], where["base_y"], np.deg2rad(where["base_yaw"]))
     scene.set_torso(where["torso"])
     found = []
     for g, q in enumerate(postures):
         scene.set_arm(q)
-        free = posture_contact(problem, work, 0, g, q) == NO_CONTACT
+        free = posture_contact(problem, work, rows_at(grid, [0]), g, q) == NO_CONTACT
         found.append((free, not scene.violations()))
     kernel, drake = np.array(found).T
     assert 20 < kernel.sum() < 112
@@ -119,6 +120,6 @@ def test_the_kernel_agrees_with_drake_at_margins_of_its_own(spec, shaving, full_
 @pytest.mark.parametrize(("h", "g"), [(54470, 6), (54470, 7), (55934, 6)], ids=str)
 def test_gripper_against_robot_is_reported_before_joint_limits(lowered, h, g):
     # Joint 1 would have to pass its limits, and the gripper at the goal touches the robot.
-    scores = score_one(build_problem(lowered.arrays, lowered.grid), h)
+    scores = score_one(build_problem(lowered.arrays), rows_at(lowered.grid, [h]))
     assert scores.reason[0, g] == GRIPPER_BLOCKED_BY_ROBOT
     assert scores.contact[0, g] >= 0

@@ -7,6 +7,7 @@ import pytest
 
 from tcs.kernel.dexterity import MEASURES
 from tcs.kernel.problem import build_problem
+from tcs.kernel.rows import rows_at
 from tcs.kernel.scores import REACHED
 from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan
 from tcs.kernel.verification.reference import jacobian, measured
@@ -71,14 +72,11 @@ def test_each_search_is_best_by_its_own_measure(lowered, measure):
 def test_the_scan_finds_what_the_search_found_or_better(lowered, measure, rng):
     shortfalls = []
     for scene, grid in scenes(lowered, range(4)):
-        scores, problem = (
-            scores_of(scene, grid, measure=measure),
-            build_problem(scene, grid, measure),
-        )
+        scores, problem = scores_of(scene, grid, measure=measure), build_problem(scene, measure)
         found = np.argwhere(scores.reason == REACHED)
         for h, g in found[rng.choice(len(found), min(6, len(found)), replace=False)]:
             q = np.full(7, np.nan)
-            value = dense_scan(problem, h, g, DENSE_SAMPLES, q)
+            value = dense_scan(problem, rows_at(grid, [h]), g, DENSE_SAMPLES, q)
             chain = scene.chain
             exact = measured(jacobian(chain, q), q, chain.lower, chain.upper, measure)
             assert value == pytest.approx(exact, abs=1e-9 if exact > 0.1 else 3e-3)

@@ -12,6 +12,7 @@ from tcs.kernel.arrays import Chain
 from tcs.kernel.dexterity import MEASURES
 from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.problem import build_problem
+from tcs.kernel.rows import rows_at
 from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED, TOO_FAR
 from tcs.kernel.six_joints.arm import is_general, six_joint_arm
 from tcs.kernel.six_joints.solutions import (
@@ -191,13 +192,13 @@ def test_kernel_agrees_with_reference(name, rng):
 def test_dense_scan_finds_what_the_sweep_finds(name, rng):
     chain = six_joint_chain(name, SCENES[name])
     scene, grid = toy_scene(chain, SCENES[name], obstacles=3), toy_grid()
-    problem, scores = build_problem(scene, grid), scores_of(scene, grid)
+    problem, scores = build_problem(scene), scores_of(scene, grid)
     kept = np.isin(scores.reason, (REACHED, JOINT_LIMITS, ARM_BLOCKED, TOO_FAR))
     for h, g in stratified(rng, np.where(kept, scores.reason, 99), 1):
         if not kept[h, g]:
             continue
         q = np.full(7, np.nan)
-        value = dense_scan(problem, h, g, 0, q)
+        value = dense_scan(problem, rows_at(grid, [h]), g, 0, q)
         assert (value >= 0.0) == (scores.reason[h, g] == REACHED)
         if value >= 0.0:
             # The stored measure is that of joints rounded to float32.
@@ -206,9 +207,9 @@ def test_dense_scan_finds_what_the_sweep_finds(name, rng):
 
 def test_measures_leave_out_the_joint_that_remains_at_zero(rng):
     chain = six_joint_chain("parallel axes", 2)
-    scene, grid = toy_scene(chain, 2, goals=1), toy_grid()
+    scene = toy_scene(chain, 2, goals=1)
     for measure in MEASURES:
-        problem = build_problem(scene, grid, measure)
+        problem = build_problem(scene, measure)
         q, _ = drawn(rng, chain)
         expected = measured(jacobian(chain, q), q, chain.lower, chain.upper, measure)
         # As for seven joints, where the eigenvalues of J J^T are good to 1e-7.

@@ -76,11 +76,11 @@ def test_clusters_of_a_body_with_many_shapes_change_no_score(lowered, seed, monk
     chain = chain_of(seed, lowered)
     rng, grid = np.random.default_rng(seed), toy_grid()
     scene = crowded(toy_scene(chain, seed, obstacles=4), rng, 30)
-    assert max(np.diff(build_problem(scene, grid).link_groups.clusters)) > 2
+    assert max(np.diff(build_problem(scene).link_groups.clusters)) > 2
     scores = scores_of(scene, grid)
     compare(scene, grid, scores, stratified(rng, scores.reason, 1))
     monkeypatch.setattr(groups, "CLUSTER", len(scene.body.type))
-    assert max(np.diff(build_problem(scene, grid).body_groups.clusters)) == 1
+    assert max(np.diff(build_problem(scene).body_groups.clusters)) == 1
     whole = scores_of(scene, grid)
     for name in ("reason", "contact", "dexterity", "joints"):
         np.testing.assert_array_equal(getattr(scores, name), getattr(whole, name))
@@ -317,8 +317,8 @@ def test_goals_at_singularities_are_reached_truly_or_not_at_all(offset, rng):
 def test_nothing_the_arm_can_touch_is_left_off_the_list(rng):
     # Straight up, this arm reaches as far as `arm_radius` allows.
     chain = straight_arm(np.full(7, 3.0), 0.0)
-    scene, grid = toy_scene(chain, 0), toy_grid()
-    radius = build_problem(scene, grid).arm_radius
+    scene = toy_scene(chain, 0)
+    radius = build_problem(scene).arm_radius
     extents = []
     for q in (np.zeros(7), *rng.uniform(-3, 3, (50, 7))):
         poses = link_poses(chain, q)
@@ -342,11 +342,12 @@ SCRIPT = """
 import pickle, sys
 import numpy as np
 from tcs.kernel.problem import build_problem
-from tcs.kernel.sweep import gripper_contacts, score_slice
+from tcs.kernel.sweep import gripper_contacts, score_rows
+from tcs.kernel.rows import grid_rows
 from tcs.kernel.scores import Scores
 with open(sys.argv[1], "rb") as file:
     scene, grid, rows = pickle.load(file)
-problem = build_problem(scene, grid)
+problem = build_problem(scene)
 goals = scene.goal_p.shape[1]
 shape = (rows[1] - rows[0], goals)
 scores = Scores(
@@ -356,7 +357,7 @@ scores = Scores(
     np.zeros((*shape, 7), np.float32),
 )
 with np.errstate(all="ignore"):
-    score_slice(problem, gripper_contacts(problem), *rows, scores)
+    score_rows(problem, gripper_contacts(problem), grid_rows(grid, *rows), scores)
 with open(sys.argv[2], "wb") as file:
     pickle.dump(tuple(scores), file)
 """

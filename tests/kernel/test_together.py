@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from tcs.kernel.problem import build_problem
+from tcs.kernel.rows import rows_at
 from tcs.kernel.together.arms import TwoArms
 from tcs.kernel.verification.constructed import random_posture
 from tcs.kernel.verification.reference_together import arms_touch, reached_together
@@ -22,7 +23,7 @@ class Hands:
         self.arrays = tuple(one.arrays for one in lowered)
         self.names = [one.robot_bodies for one in lowered]
         self.grid = lowered[0].grid
-        self.two = TwoArms(*(build_problem(a, self.grid) for a in self.arrays), self.arrays)
+        self.two = TwoArms(*(build_problem(a) for a in self.arrays), self.arrays)
 
 
 @pytest.fixture(scope="module")
@@ -76,8 +77,8 @@ def test_postures_of_the_best_pair_are_the_best_that_do_not_touch(hands):
     none = np.empty((0, 7))
     reached = []
     for h in range(16):
-        best = hands.two.best_pair(h, (0, 0), (none, none), 40)
-        postures = [hands.two.postures(k, h, 0, none, 40) for k in range(2)]
+        best = hands.two.best_pair(rows_at(hands.grid, [h]), (0, 0), (none, none), 40)
+        postures = [hands.two.postures(k, rows_at(hands.grid, [h]), 0, none, 40) for k in range(2)]
         free = [
             min(a, b)
             for q, a in zip(*postures[0], strict=True)
@@ -96,5 +97,5 @@ def test_postures_of_the_best_pair_are_the_best_that_do_not_touch(hands):
 @pytest.mark.parametrize("h", [0, 3])
 def test_the_reference_reaches_the_same_pairs(hands, h):
     none = np.empty((0, 7))
-    found = hands.two.best_pair(h, (0, 0), (none, none), 12)
+    found = hands.two.best_pair(rows_at(hands.grid, [h]), (0, 0), (none, none), 12)
     assert reached_together(hands.arrays, hands.grid, h, (0, 0), 12) == (found is not None)

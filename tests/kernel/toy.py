@@ -9,8 +9,9 @@ import numpy as np
 from tcs.kernel.analytic.solver import outside_solver
 from tcs.kernel.arrays import BOX, CAPSULE, SPHERE, GridArrays, SceneArrays, Shapes
 from tcs.kernel.problem import build_problem
+from tcs.kernel.rows import grid_rows
 from tcs.kernel.scores import Scores
-from tcs.kernel.sweep import gripper_contacts, score_slice
+from tcs.kernel.sweep import gripper_contacts, score_rows
 from tcs.kernel.verification.reference import compose, inverse, link_poses, rot_z
 from tests.kernel.shapes import as_shapes, placed, random_joints, rotation
 
@@ -172,8 +173,7 @@ def crowded(scene, rng, number):
 
 def size_of(grid):
     """Return the number of configurations."""
-    places = len(grid.base_x) * len(grid.base_y) * len(grid.base_yaw)
-    return grid.environment_states * places * grid.torso_levels
+    return grid.size
 
 
 def scores_of(scene, grid, cuts=None, measure="isotropy", numeric=False):
@@ -186,7 +186,7 @@ def scores_of(scene, grid, cuts=None, measure="isotropy", numeric=False):
         measure: Name of the dexterity measure.
         numeric: Whether to solve the arm as if it had no closed form.
     """
-    problem = build_problem(scene, grid, measure)
+    problem = build_problem(scene, measure)
     if numeric:
         problem = problem._replace(arm=outside_solver(scene.chain))
     size, goals = size_of(grid), scene.goal_p.shape[1]
@@ -201,20 +201,13 @@ def scores_of(scene, grid, cuts=None, measure="isotropy", numeric=False):
     cuts = [0, *(cuts or []), size]
     for start, stop in itertools.pairwise(cuts):
         part = Scores(*(array[start:stop] for array in scores))
-        score_slice(problem, grippers, start, stop, part)
+        score_rows(problem, grippers, grid_rows(grid, start, stop), part)
     return scores
 
 
 def goal_in_base(scene, grid, h, goal):
     """Return X_AG at configuration h."""
-    shape = (
-        grid.environment_states,
-        len(grid.base_x),
-        len(grid.base_y),
-        len(grid.base_yaw),
-        grid.torso_levels,
-    )
-    s, x, y, yaw, torso = np.unravel_index(h, shape)
+    s, x, y, yaw, torso = np.unravel_index(h, grid.shape)
     X_WB = rot_z(grid.base_yaw[yaw]), np.array([grid.base_x[x], grid.base_y[y], 0.0])
     X_WA = compose(X_WB, (scene.arm_base_R[torso], scene.arm_base_p[torso]))
     return compose(inverse(X_WA), (scene.goal_R[s, goal], scene.goal_p[s, goal]))

@@ -12,11 +12,20 @@ from tcs.capability.arplace.task import TableTask
 from tcs.capability.reach import OnProgress
 from tcs.capability.tasks import Grasp
 from tcs.errors import GridError
-from tcs.kernel.arrays import CAPSULE, SPHERE, BoolArray, FloatArray, SceneArrays, Shapes
+from tcs.kernel.arrays import (
+    CAPSULE,
+    SPHERE,
+    BoolArray,
+    FloatArray,
+    GridArrays,
+    SceneArrays,
+    Shapes,
+)
 from tcs.kernel.contacts import BASE_FIXED
 from tcs.kernel.problem import Problem, build_problem
-from tcs.kernel.scores import REACHED, Scores
-from tcs.kernel.sweep import gripper_contacts, score_slice
+from tcs.kernel.rows import grid_rows
+from tcs.kernel.scores import REACHED, new_scores
+from tcs.kernel.sweep import gripper_contacts, score_rows
 from tcs.model.grid import Axis, Grid
 from tcs.model.robots import RobotFile
 from tcs.model.scene import EnvironmentFile, LoweredScene, Scene, SceneSpec, lower
@@ -64,14 +73,14 @@ def label(
     lowered = lower(scene, None, _grid(task, torso_height))
     arrays = _with_heights(lowered, task)
     grid = lowered.grid._replace(environment_states=task.height.count)
-    problem = build_problem(arrays, grid)
+    problem = build_problem(arrays)
     states, x, y = task.height.count, task.base_x.count, task.base_y.count
     goals = problem.goal_p.shape[1]
     found = np.empty((states * x * y, goals), np.bool_)
     grippers = gripper_contacts(problem)
     done = 0
     runs = (
-        delayed(_label_slice)(problem, grippers, start, found[start : start + _SLICE])
+        delayed(_label_slice)(problem, grippers, grid, start, found[start : start + _SLICE])
         for start in range(0, len(found), _SLICE)
     )
     # Threads suffice, as the kernel releases the interpreter lock.
@@ -172,15 +181,11 @@ def _with_heights(lowered: LoweredScene, task: TableTask) -> SceneArrays:
     )
 
 
-def _label_slice(problem: Problem, grippers: Any, start: int, found: BoolArray) -> int:
+def _label_slice(
+    problem: Problem, grippers: Any, grid: GridArrays, start: int, found: BoolArray
+) -> int:
     """Fill the labels of consecutive base positions from `start` on; return their number."""
-    shape = found.shape
-    scores = Scores(
-        np.empty(shape, np.uint8),
-        np.empty(shape, np.int32),
-        np.zeros(shape, np.float32),
-        np.zeros((*shape, 7), np.float32),
-    )
-    score_slice(problem, grippers, start, start + len(found), scores)
+    scores = new_scores(*found.shape)
+    score_rows(problem, grippers, grid_rows(grid, start, start + len(found)), scores)
     found[:] = scores.reason == REACHED
     return found.size

@@ -56,7 +56,7 @@ def approach_scene(problem: Problem) -> LineScene:
     first = torso_scene(problem, 0)
     needed = needed_pairs(first, first.body[first.pair[:, 1]] >= problem.environment_bodies)
     apart = _is_apart_from_torso(problem, first)
-    for torso in range(1, problem.torso_levels):
+    for torso in range(1, len(problem.base_R)):
         left = ~needed & apart
         if np.any(left):
             fixed = first.fixed.copy()
@@ -76,7 +76,7 @@ def _is_apart_from_torso(problem: Problem, scene: MotionScene) -> BoolArray:
     """Return which pairs are of a shape that is elsewhere in A at other torso levels.
 
     Args:
-        problem: The scene and its grid.
+        problem: The scene.
         scene: A scene of it without groups; the result has shape (n_pairs,).
     """
     moved = _is_moved(problem.body_A)
@@ -98,7 +98,7 @@ def _boxes(problem: Problem, scene: MotionScene) -> FloatArray:
     bodies = scene.body[len(scene.links) + shapes :] - problem.environment_bodies
     first = [int(np.argmax(problem.body_body == body)) for body in bodies]
     on_base = problem.body_mount[np.array(first, np.int64)] == BASE_FIXED
-    every = np.repeat(boxes[None], problem.torso_levels, axis=0)
+    every = np.repeat(boxes[None], len(problem.base_R), axis=0)
     for torso, (R_BA, p_BA) in enumerate(zip(problem.base_R, problem.base_p, strict=True)):
         # From A at the first torso level to A here, by way of the base.
         p = R_BA.T @ (problem.base_p[0] - p_BA)
@@ -119,7 +119,7 @@ def place_scene(
     """Place the shapes around the arm that are elsewhere than before.
 
     Args:
-        problem: The scene and its grid.
+        problem: The scene.
         work: Workspace with the environment in A.
         torso: Torso level.
         scene: Its centres are filled.

@@ -1,4 +1,4 @@
-"""Approaches of the reached pairs of a scored grid."""
+"""Approaches of reached pairs of configuration and goal."""
 
 from __future__ import annotations
 
@@ -11,13 +11,19 @@ from tcs.kernel.approach.memory import Approach, new_approach
 from tcs.kernel.approach.pairs import approach_pair, follow_posture
 from tcs.kernel.approach.scene import LineScene, approach_scene, place_scene
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.base_pose import environment_in_arm_base, goal_in_arm_base, place_base
+from tcs.kernel.base_pose import (
+    environment_in_arm_base,
+    goal_in_arm_base,
+    place_base,
+    shares_base,
+)
 from tcs.kernel.cache import inner, jit
 from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.dexterity.measures import measure_at, rounded_inward
 from tcs.kernel.motion.scene import NO_PAIR
 from tcs.kernel.motion.straight import DONE
 from tcs.kernel.problem import Problem
+from tcs.kernel.rows import Rows
 from tcs.kernel.scores import APPROACH_BLOCKED, REACHED
 from tcs.kernel.views import unowned
 
@@ -33,10 +39,10 @@ class ApproachLines(NamedTuple):
 
 
 class ReachedPairs(NamedTuple):
-    """Scores of reached pairs, in ascending order of the configurations."""
+    """Scores of reached pairs, in ascending order of the rows."""
 
     pair: IntArray
-    """Configuration and goal, shape (n, 2)."""
+    """Row and goal, shape (n, 2)."""
     reason: NDArray[np.uint8]
     """REACHED; filled with the reason where no posture is approachable, shape (n,)."""
     contact: NDArray[np.int32]
@@ -48,13 +54,18 @@ class ReachedPairs(NamedTuple):
 
 
 def score_approaches(
-    problem: Problem, lines: ApproachLines, pairs: ReachedPairs, memory: Approach | None = None
+    problem: Problem,
+    lines: ApproachLines,
+    rows: Rows,
+    pairs: ReachedPairs,
+    memory: Approach | None = None,
 ) -> None:
     """Replace the scores of reached pairs by those with approach.
 
     Args:
-        problem: The scene, its goals and its grid; an arm with a closed form.
+        problem: The scene and its goals; an arm with a closed form.
         lines: The approaches of the goals.
+        rows: The configurations.
         pairs: The scores; replaced.
         memory: Made by `new_approach`, and used by no other thread; None makes it, and the
             `approach_scene` of the problem, which takes a tenth of a second.
@@ -63,13 +74,13 @@ def score_approaches(
     memory = new_approach(problem, approach_scene(problem)) if memory is None else memory
     # Other orders in memory are other types, for which the code would be compiled anew.
     pairs = pairs._replace(pair=np.ascontiguousarray(pairs.pair, dtype=np.int64))
-    _score_approaches(problem, memory, lines, pairs)
+    _score_approaches(problem, memory, lines, rows, pairs)
 
 
 def approach_spline(
     problem: Problem,
     lines: ApproachLines,
-    configuration: int,
+    row: Rows,
     goal: int,
     q: FloatArray,
     scene: LineScene | None = None,
@@ -77,9 +88,9 @@ def approach_spline(
     """Return the approach of a posture as a spline in joint space, None if none is found.
 
     Args:
-        problem: The scene, its goals and its grid; an arm with a closed form.
+        problem: The scene and its goals; an arm with a closed form.
         lines: The approaches of the goals.
-        configuration: Flat index of the initial configuration.
+        row: The configuration.
         goal: Number of the goal.
         q: Joint angles at the goal, free of contact [rad], shape (7,).
         scene: The `approach_scene` of the problem, which takes a tenth of a second to make.
@@ -91,7 +102,7 @@ def approach_spline(
     """
     approach = new_approach(problem, approach_scene(problem) if scene is None else scene)
     posture = np.array(q, dtype=np.float64)
-    if _follow_posture(problem, approach, lines, configuration, goal, posture) != DONE:
+    if _follow_posture(problem, approach, lines, row, goal, posture) != DONE:
         return None
     count = approach.curve.pieces[0] + 1
     points, tangents = approach.curve.points[:count], approach.curve.tangents[:count]
@@ -103,14 +114,14 @@ def _follow_posture(
     owned_problem: Problem,
     owned_approach: Approach,
     owned_lines: ApproachLines,
-    configuration: int,
+    owned_row: Rows,
     goal: int,
     q: FloatArray,
 ) -> int:
     problem, approach = unowned(owned_problem), unowned(owned_approach)
-    lines = unowned(owned_lines)
-    torso = configuration % problem.torso_levels
-    state = place_base(problem, approach.work, configuration // problem.torso_levels)
+    lines, row = unowned(owned_lines), unowned(owned_row)
+    state, torso = row.state[0], row.torso[0]
+    place_base(problem, approach.work, row, 0)
     _place_surroundings(problem, approach, torso)
     _place_goal(problem, approach, lines, state, torso, goal)
     return follow_posture(problem, approach, lines.fastest[goal], q)
@@ -146,20 +157,19 @@ def _score_approaches(
     owned_problem: Problem,
     owned_approach: Approach,
     owned_lines: ApproachLines,
+    owned_rows: Rows,
     owned_pairs: ReachedPairs,
 ) -> None:
     problem, approach = unowned(owned_problem), unowned(owned_approach)
-    lines, pairs = unowned(owned_lines), unowned(owned_pairs)
-    work, q = approach.work, np.empty(7)
-    place, state, configuration = -1, 0, -1
+    lines, rows, pairs = unowned(owned_lines), unowned(owned_rows), unowned(owned_pairs)
+    work, q, last = approach.work, np.empty(7), -1
     for n in range(len(pairs.pair)):
-        h, g = pairs.pair[n, 0], pairs.pair[n, 1]
-        torso = h % problem.torso_levels
-        if h // problem.torso_levels != place:
-            place = h // problem.torso_levels
-            state = place_base(problem, work, place)
-        if h != configuration:
-            configuration = h
+        row, g = pairs.pair[n, 0], pairs.pair[n, 1]
+        state, torso = rows.state[row], rows.torso[row]
+        if row != last:
+            if last == -1 or not shares_base(rows, row, last):
+                place_base(problem, work, rows, row)
+            last = row
             _place_surroundings(problem, approach, torso)
         _place_goal(problem, approach, lines, state, torso, g)
         for k in range(7):

@@ -11,6 +11,7 @@ from tcs.kernel.collide import BOUND, CENTRE, COLUMNS, ROTATION
 from tcs.kernel.distances import DistanceTables
 from tcs.kernel.motion.link_poses import LANES
 from tcs.kernel.problem import Problem
+from tcs.kernel.rows import Rows
 
 FULL_TURN = 2.0 * np.pi
 STACK = 256
@@ -175,15 +176,14 @@ class MotionWorkspace(NamedTuple):
     arm's shape first."""
 
 
-def motion_scene(problem: Problem, configuration: int) -> MotionScene:
-    """Return a scene at one initial configuration of its grid, prepared for motions.
+def motion_scene(problem: Problem, row: Rows) -> MotionScene:
+    """Return a scene at one initial configuration, prepared for motions.
 
     Args:
-        problem: The scene and its grid.
-        configuration: Flat index of the initial configuration.
+        problem: The scene.
+        row: The configuration.
     """
-    scene = torso_scene(problem, configuration % problem.torso_levels)
-    return placed(scene, problem, configuration)
+    return placed(torso_scene(problem, int(row.torso[0])), problem, row)
 
 
 def torso_scene(problem: Problem, torso: int) -> MotionScene:
@@ -193,7 +193,7 @@ def torso_scene(problem: Problem, torso: int) -> MotionScene:
     around groups of shapes: `placed` places what else there is.
 
     Args:
-        problem: The scene and its grid.
+        problem: The scene.
         torso: The torso level.
     """
     # The boxes around groups of shapes come after the shapes, and are left out.
@@ -243,30 +243,36 @@ def torso_scene(problem: Problem, torso: int) -> MotionScene:
     )
 
 
-def placed(scene: MotionScene, problem: Problem, configuration: int) -> MotionScene:
+def placed(scene: MotionScene, problem: Problem, row: Rows) -> MotionScene:
     """Return a scene with its environment as at one initial configuration.
 
     Args:
         scene: From `torso_scene` of the configuration's torso level, with all pairs or some, with
             groups or without; or from this function.
-        problem: The scene and its grid.
-        configuration: Flat index of the initial configuration.
+        problem: The scene.
+        row: The configuration.
     """
-    sizes = (problem.base_x.size, problem.base_y.size, problem.base_yaw.size, problem.torso_levels)
-    state, x, y, yaw, torso = (
-        int(i) for i in np.unravel_index(configuration, (problem.environment_states, *sizes))
-    )
-    angle = problem.base_yaw[yaw]
-    R_WB = np.array(
-        [[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0, 0, 1.0]]
-    )
-    p_WB = np.array([problem.base_x[x], problem.base_y[y], 0.0])
-    R_WA = R_WB @ problem.base_R[torso]
-    p_WA = p_WB + R_WB @ problem.base_p[torso]
-    environment = moved_shapes(problem.environment[state], R_WA.T, -R_WA.T @ p_WA)
+    R_WA, p_WA = arm_base(problem, row)
+    environment = moved_shapes(problem.environment[row.state[0]], R_WA.T, -R_WA.T @ p_WA)
     fixed = np.concatenate([environment, scene.fixed[len(environment) :]])
     always = scene.pair[: scene.first_pair[-1]]
     return scene._replace(fixed=fixed, centre=_centres(always, len(scene.links), fixed))
+
+
+def arm_base(problem: Problem, row: Rows) -> tuple[FloatArray, FloatArray]:
+    """Return X_WA at one configuration: orientation (3, 3) and origin (3,) [m] of the arm base."""
+    c, s, torso = np.cos(row.yaw[0]), np.sin(row.yaw[0]), row.torso[0]
+    R_WB = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    p_WB = np.array([row.x[0], row.y[0], 0.0])
+    return R_WB @ problem.base_R[torso], p_WB + R_WB @ problem.base_p[torso]
+
+
+def goal_from_arm_base(problem: Problem, row: Rows, goal: int) -> tuple[FloatArray, FloatArray]:
+    """Return X_AG of a goal at one configuration: orientation (3, 3) and position (3,) [m]."""
+    R_WA, p_WA = arm_base(problem, row)
+    state = row.state[0]
+    R_AG = np.ascontiguousarray(R_WA.T @ problem.goal_R[state, goal])
+    return R_AG, R_WA.T @ (problem.goal_p[state, goal] - p_WA)
 
 
 def carriers(problem: Problem) -> IntArray:

@@ -23,6 +23,7 @@ from tcs.kernel.group_contacts import groups_touch
 from tcs.kernel.kinematics import link_poses
 from tcs.kernel.motion.postures import postures_at
 from tcs.kernel.problem import Problem, gaps_between
+from tcs.kernel.rows import Rows
 from tcs.kernel.six_joints.pairs import new_six_joint_solver
 from tcs.kernel.six_joints.solutions import MOST_SOLUTIONS, solve_six_joints, within_limits
 from tcs.kernel.views import unowned
@@ -81,7 +82,7 @@ class TwoArms:
 
     def best_pair(
         self,
-        configuration: int,
+        row: Rows,
         goals: tuple[int, int],
         known: tuple[FloatArray, FloatArray],
         samples: int,
@@ -89,7 +90,7 @@ class TwoArms:
         """Return the pair of free postures with the greatest lesser measure.
 
         Args:
-            configuration: Flat index of an initial configuration.
+            row: An initial configuration.
             goals: The goal of each arm.
             known: A free posture of each arm by itself [rad], shape (0 or 1, 7).
             samples: Values of the free joint that are tried.
@@ -98,14 +99,14 @@ class TwoArms:
             The lesser measure and the joints of both arms [rad], rounded to float32; None if the
             arms touch each other in every pair.
         """
-        found = [self.postures(k, configuration, goals[k], known[k], samples) for k in range(2)]
+        found = [self.postures(k, row, goals[k], known[k], samples) for k in range(2)]
         (first, of_first), (second, of_second) = found
         if not len(first) or not len(second):
             return None
         lesser = np.minimum(of_first[:, None], of_second[None, :])
         order = np.argsort(-lesser, axis=None, kind="stable")
         pairs = np.stack(np.unravel_index(order, lesser.shape), axis=1).astype(np.int64)
-        torso = configuration % self.problems[0].torso_levels
+        torso = int(row.torso[0])
         best = best_free_pair(*self.problems, *self.works, torso, first, second, pairs, self.gaps)
         if best < 0:
             return None
@@ -113,15 +114,12 @@ class TwoArms:
         return float(lesser[i, j]), first[i], second[j]
 
     def postures(
-        self, k: int, configuration: int, goal: int, known: FloatArray, samples: int
+        self, k: int, row: Rows, goal: int, known: FloatArray, samples: int
     ) -> tuple[FloatArray, FloatArray]:
         """Return free postures of an arm by itself at a goal, the best first, and measures."""
         problem, work = self.problems[k], self.works[k]
         free = problem.freedom
-        state = configuration // (
-            problem.torso_levels * problem.base_x.size * problem.base_y.size * problem.base_yaw.size
-        )
-        R, p = problem.goal_R[state, goal], problem.goal_p[state, goal]
+        R, p = problem.goal_R[row.state[0], goal], problem.goal_p[row.state[0], goal]
         offsets = np.zeros((1, 6))
         if free.first.size and np.any(free.form[goal]):
             begin = free.start[goal]
@@ -130,13 +128,13 @@ class TwoArms:
         form = free.form[goal] if free.first.size else np.zeros(15)
         parts = [known] if len(known) else []
         for u in offsets:
-            if not place_gripper_pose(problem, work, configuration, form, u, R, p):
+            if not place_gripper_pose(problem, work, row, form, u, R, p):
                 continue
             if problem.joints == 6:
                 tried = six_joint_postures(problem, work)
             else:
                 tried = postures_at(problem, work.R_AG, work.p_AG, samples)
-            kept = keep_free(problem, work, configuration % problem.torso_levels, tried)
+            kept = keep_free(problem, work, int(row.torso[0]), tried)
             parts.append(tried[:kept])
         postures = np.concatenate(parts) if parts else np.empty((0, 7))
         measures = measures_of(problem, postures)
@@ -155,7 +153,7 @@ def six_joint_postures(problem: Problem, work: Workspace) -> FloatArray:
 def place_gripper_pose(
     owned_problem: Problem,
     owned_work: Workspace,
-    configuration: int,
+    owned_row: Rows,
     form: FloatArray,
     u: FloatArray,
     R_WG: FloatArray,
@@ -166,15 +164,16 @@ def place_gripper_pose(
     Args:
         owned_problem: The scene.
         owned_work: Filled.
-        configuration: Flat index of an initial configuration.
+        owned_row: An initial configuration.
         form: Row of `FreeGoals.form`, zeros for a single pose.
         u: Parameters of the pose, shape (6,).
         R_WG: Orientation of the goal, shape (3, 3).
         p_WG: Position of the goal [m], shape (3,).
     """
     problem, work = unowned(owned_problem), unowned(owned_work)
-    torso = configuration % problem.torso_levels
-    state = place_base(problem, work, configuration // problem.torso_levels)
+    row = unowned(owned_row)
+    state, torso = row.state[0], row.torso[0]
+    place_base(problem, work, row, 0)
     environment_in_arm_base(problem, work, torso)
     R, p = np.empty((3, 3)), np.empty(3)
     pose_of(form, u, R_WG, p_WG, R, p)

@@ -6,6 +6,7 @@ import numpy as np
 
 from tcs.kernel.arrays import BOX, CAPSULE, SPHERE, FloatArray, GridArrays, SceneArrays, Shapes
 from tcs.kernel.problem import build_problem
+from tcs.kernel.rows import rows_at
 from tcs.kernel.verification.free_postures import base_is_free
 from tcs.kernel.verification.reference import Pose, compose, rot_z
 from tcs.kernel.workspace import new_workspace
@@ -18,19 +19,18 @@ def cluttered(
     rng: np.random.Generator, scene: SceneArrays, grid: GridArrays, number: int = CLUTTER
 ) -> tuple[SceneArrays, int]:
     """Return the scene with shapes added about one random configuration, whose base stays free."""
-    states = grid.environment_states
-    size = states * len(grid.base_x) * len(grid.base_y) * len(grid.base_yaw) * grid.torso_levels
-    problem = build_problem(scene, grid)
+    problem = build_problem(scene)
     while True:
-        h = int(rng.integers(size))
-        if not base_is_free(problem, new_workspace(problem), h):
+        h = int(rng.integers(grid.size))
+        row = rows_at(grid, [h])
+        if not base_is_free(problem, new_workspace(problem), row):
             continue
         at = arm_base(scene, grid, h)[1]
         added = scene
         for k in range(number):
             more = with_obstacle(added, *random_shape(rng, at, k))
-            crowded = build_problem(more, grid)
-            if base_is_free(crowded, new_workspace(crowded), h):
+            crowded = build_problem(more)
+            if base_is_free(crowded, new_workspace(crowded), row):
                 added = more
         return added, h
 
@@ -76,13 +76,6 @@ def with_obstacle(
 
 def arm_base(scene: SceneArrays, grid: GridArrays, h: int) -> Pose:
     """Return X_WA at configuration h."""
-    shape = (
-        grid.environment_states,
-        len(grid.base_x),
-        len(grid.base_y),
-        len(grid.base_yaw),
-        grid.torso_levels,
-    )
-    _, x, y, yaw, torso = (int(i) for i in np.unravel_index(h, shape))
+    _, x, y, yaw, torso = (int(i) for i in np.unravel_index(h, grid.shape))
     X_WB = rot_z(grid.base_yaw[yaw]), np.array([grid.base_x[x], grid.base_y[y], 0.0])
     return compose(X_WB, (scene.arm_base_R[torso], scene.arm_base_p[torso]))

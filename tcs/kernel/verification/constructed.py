@@ -15,8 +15,9 @@ import numpy as np
 from tcs.kernel.arrays import SPHERE, Chain, FloatArray, GridArrays, SceneArrays
 from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.problem import Problem, build_problem
-from tcs.kernel.scores import Scores
-from tcs.kernel.sweep import gripper_contacts, score_slice
+from tcs.kernel.rows import Rows, rows_at
+from tcs.kernel.scores import Scores, new_scores
+from tcs.kernel.sweep import gripper_contacts, score_rows
 from tcs.kernel.verification.clutter import arm_base, cluttered, with_obstacle
 from tcs.kernel.verification.free_postures import base_is_free, posture_contact
 from tcs.kernel.verification.reference import (
@@ -52,19 +53,14 @@ class Constructed:
 
     def scores(self, measure: str = "isotropy") -> Scores:
         """Return the kernel's scores of the configuration, shapes (1, goals, ...)."""
-        return score_one(build_problem(self.scene, self.grid, measure), self.configuration)
+        row = rows_at(self.grid, [self.configuration])
+        return score_one(build_problem(self.scene, measure), row)
 
 
-def score_one(problem: Problem, configuration: int) -> Scores:
+def score_one(problem: Problem, row: Rows) -> Scores:
     """Return the kernel's scores of one configuration, shapes (1, goals, ...)."""
-    goals = problem.goal_p.shape[1]
-    scores = Scores(
-        reason=np.empty((1, goals), np.uint8),
-        contact=np.empty((1, goals), np.int32),
-        dexterity=np.zeros((1, goals), np.float32),
-        joints=np.zeros((1, goals, 7), np.float32),
-    )
-    score_slice(problem, gripper_contacts(problem), configuration, configuration + 1, scores)
+    scores = new_scores(1, problem.goal_p.shape[1])
+    score_rows(problem, gripper_contacts(problem), row, scores)
     return scores
 
 
@@ -119,9 +115,9 @@ def free_postures(scene: SceneArrays, grid: GridArrays, h: int, postures: FloatA
     eased = scene._replace(
         margin=scene.margin + MARGIN_LEFT, self_margin=scene.self_margin + MARGIN_LEFT
     )
-    problem = build_problem(with_goals(eased, grid, h, postures), grid)
+    problem, row = build_problem(with_goals(eased, grid, h, postures)), rows_at(grid, [h])
     work = new_workspace(problem)
-    free = [posture_contact(problem, work, h, g, q) == NO_CONTACT for g, q in enumerate(postures)]
+    free = [posture_contact(problem, work, row, g, q) == NO_CONTACT for g, q in enumerate(postures)]
     return postures[np.array(free, bool)]
 
 
@@ -256,8 +252,8 @@ def between_contacts(
     )
     lower, upper = np.maximum(chain.lower, q - 0.5), np.minimum(chain.upper, q + 0.5)
     tight = tight._replace(chain=chain._replace(lower=lower, upper=upper))
-    problem = build_problem(tight, grid)
-    if not base_is_free(problem, new_workspace(problem), h):
+    problem = build_problem(tight)
+    if not base_is_free(problem, new_workspace(problem), rows_at(grid, [h])):
         return None
     if not len(free_postures(tight, grid, h, q[None])):
         return None

@@ -16,6 +16,7 @@ from tcs.kernel.cache import inner, int_constant, jit
 from tcs.kernel.contacts import NO_CONTACT, arm_contact, at_goal, gripper_body_contact
 from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.problem import Problem
+from tcs.kernel.rows import Rows
 from tcs.kernel.verification.free_scans import free_scans
 from tcs.kernel.verification.numeric_dense import STARTS, numeric_dense_scans
 from tcs.kernel.verification.six_joint_scans import six_joint_scans
@@ -33,27 +34,25 @@ DENSE_SAMPLES = 11_520
 """Angles of the free joint in a dense scan: one every 1/32 degree of a full turn."""
 
 
-def dense_scan(
-    problem: Problem, configuration: int, goal: int, samples: int, joints: FloatArray
-) -> float:
+def dense_scan(problem: Problem, row: Rows, goal: int, samples: int, joints: FloatArray) -> float:
     """Return the dexterity of the best collision-free sample of one pair, -1 if none is free.
 
     Args:
-        problem: The scene, its goals and its grid.
-        configuration: As in `dense_scans`.
+        problem: The scene and its goals.
+        row: The configuration.
         goal: As in `dense_scans`.
         samples: As in `dense_scans`.
         joints: Filled with the joint angles of the solution [rad] if there is one, shape (7,).
     """
-    pairs, found = np.array([[configuration, goal]]), np.empty((1, 7))
-    (value,) = dense_scans(problem, pairs, samples, found)
+    pairs, found = np.array([[0, goal]]), np.empty((1, 7))
+    (value,) = dense_scans(problem, row, pairs, samples, found)
     if value >= 0.0:
         joints[:] = found[0]
     return float(value)
 
 
 def dense_scans(
-    problem: Problem, pairs: IntArray, samples: int, joints: FloatArray
+    problem: Problem, rows: Rows, pairs: IntArray, samples: int, joints: FloatArray
 ) -> NDArray[np.float64]:
     """Return the dexterity of the best collision-free sample of each pair, -1 where none is free.
 
@@ -65,23 +64,24 @@ def dense_scans(
     Contacts of base and gripper with the environment are not checked. The GIL is released.
 
     Args:
-        problem: The scene, its goals and its grid.
-        pairs: Flat indices of initial configurations whose base is free of contact, and goals at
-            which the gripper is free of contact with the environment, shape (n, 2).
+        problem: The scene and its goals.
+        rows: Initial configurations.
+        pairs: Rows whose base is free of contact, and goals at which the gripper is free of contact
+            with the environment, shape (n, 2).
         samples: Number of angles, spread evenly over the limits of the free joint; ignored without
             a closed form.
         joints: Filled with the joint angles of each solution [rad], shape (n, 7).
     """
     if problem.freedom.first.size:
-        return free_scans(problem, pairs, samples, joints)
+        return free_scans(problem, rows, pairs, samples, joints)
     if problem.joints == 6:
-        return six_joint_scans(problem, pairs, joints)
+        return six_joint_scans(problem, rows, pairs, joints)
     if is_outside(problem.arm):
-        return numeric_dense_scans(problem, pairs, STARTS, joints)
+        return numeric_dense_scans(problem, rows, pairs, STARTS, joints)
     values = np.empty(len(pairs))
     # Allocated here to outlive the call: the compiled code takes unowned views of these arrays.
     work, search = new_workspace(problem), new_search()
-    _dense_scans(problem, work, search, pairs, samples, values, joints)
+    _dense_scans(problem, work, search, rows, pairs, samples, values, joints)
     return values
 
 
@@ -90,12 +90,14 @@ def _dense_scans(
     owned_problem: Problem,
     owned_work: Workspace,
     owned_search: Search,
+    owned_rows: Rows,
     pairs: IntArray,
     samples: int,
     values: FloatArray,
     joints: FloatArray,
 ) -> None:
     problem, work, search = unowned(owned_problem), unowned(owned_work), unowned(owned_search)
+    rows = unowned(owned_rows)
     arm = problem.arm
     first, last = arm.lower[arm.free], arm.upper[arm.free]
     if not np.isfinite(first):
@@ -114,7 +116,7 @@ def _dense_scans(
     measures, branches = np.empty(angles.size), np.empty(angles.size, np.int64)
     for n in range(len(pairs)):
         values[n] = _scan(
-            problem, work, search, pairs[n, 0], pairs[n, 1], table,
+            problem, work, search, rows, pairs[n, 0], pairs[n, 1], table,
             angles, measures, branches, joints[n],
         )  # fmt: skip
 
@@ -124,7 +126,8 @@ def _scan(
     problem: Problem,
     work: Workspace,
     search: Search,
-    configuration: int,
+    rows: Rows,
+    row: int,
     goal: int,
     table: FloatArray,
     angles: FloatArray,
@@ -134,8 +137,8 @@ def _scan(
 ) -> float:
     """Return the dexterity of the best collision-free sample of a pair, -1 if none is free."""
     arm = problem.arm
-    torso = configuration % problem.torso_levels
-    state = place_base(problem, work, configuration // problem.torso_levels)
+    state, torso = rows.state[row], rows.torso[row]
+    place_base(problem, work, rows, row)
     goal_in_arm_base(problem, work, state, torso, goal)
     wrist_goal(arm, work.R_AG, work.p_AG, search.goal)
     samples, found, environment_placed = table.shape[1], 0, False

@@ -15,16 +15,17 @@ from tcs.kernel.contacts import (
     upper_contact,
 )
 from tcs.kernel.problem import Problem
+from tcs.kernel.rows import Rows
 from tcs.kernel.views import unowned
 from tcs.kernel.workspace import Workspace
 
 
 @jit
-def base_is_free(owned_problem: Problem, owned_work: Workspace, configuration: int) -> bool:
+def base_is_free(owned_problem: Problem, owned_work: Workspace, owned_row: Rows) -> bool:
     """Return whether the robot at rest touches nothing at a configuration."""
-    problem, work = unowned(owned_problem), unowned(owned_work)
-    torso = configuration % problem.torso_levels
-    place_base(problem, work, configuration // problem.torso_levels)
+    problem, work, row = unowned(owned_problem), unowned(owned_work), unowned(owned_row)
+    torso = row.torso[0]
+    place_base(problem, work, row, 0)
     return (
         base_contact(problem, work, BASE_FIXED, BASE_FIXED) == NO_CONTACT
         and upper_contact(problem, work, torso) == NO_CONTACT
@@ -33,12 +34,12 @@ def base_is_free(owned_problem: Problem, owned_work: Workspace, configuration: i
 
 @jit
 def posture_contact(
-    owned_problem: Problem, owned_work: Workspace, configuration: int, goal: int, q: FloatArray
+    owned_problem: Problem, owned_work: Workspace, owned_row: Rows, goal: int, q: FloatArray
 ) -> int:
     """Return a contact of arm or gripper at joint angles q that hold the tool at a goal."""
-    problem, work = unowned(owned_problem), unowned(owned_work)
-    torso = configuration % problem.torso_levels
-    state = place_base(problem, work, configuration // problem.torso_levels)
+    problem, work, row = unowned(owned_problem), unowned(owned_work), unowned(owned_row)
+    state, torso = row.state[0], row.torso[0]
+    place_base(problem, work, row, 0)
     code = gripper_environment_contact(problem, work, state, goal)
     if code != NO_CONTACT:
         return code

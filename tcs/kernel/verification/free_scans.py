@@ -20,8 +20,9 @@ from tcs.kernel.freedom.forms import (
 )
 from tcs.kernel.freedom.goals import FreeGoals, no_freedom
 from tcs.kernel.problem import Problem
+from tcs.kernel.rows import Rows
 from tcs.kernel.scores import Scores
-from tcs.kernel.sweep import gripper_contacts, score_slice
+from tcs.kernel.sweep import gripper_contacts, score_rows
 from tcs.kernel.verification.five_joint_scans import five_joint_scan
 
 ANGLES = 360
@@ -106,7 +107,7 @@ def _turning(problem: Problem, count: int) -> FreeGoals:
 
 
 def free_scans(
-    problem: Problem, pairs: IntArray, samples: int, joints: FloatArray
+    problem: Problem, rows: Rows, pairs: IntArray, samples: int, joints: FloatArray
 ) -> NDArray[np.float64]:
     """Return the dexterity of the best collision-free sample over the freedom of each goal.
 
@@ -118,28 +119,28 @@ def free_scans(
     from tcs.kernel.verification.dense import dense_scans
 
     values = np.full(len(pairs), -1.0)
-    places = problem.base_x.size * problem.base_y.size * problem.base_yaw.size
-    for i, (configuration, goal) in enumerate(pairs):
-        state = int(configuration) // (places * problem.torso_levels)
+    for i, (row, goal) in enumerate(pairs):
+        at = rows.at(slice(row, row + 1))
+        state = int(at.state[0])
         if problem.joints == FEWEST_JOINTS and not np.any(problem.freedom.step[goal]):
-            values[i] = five_joint_scan(problem, int(configuration), int(goal), joints[i])
+            values[i] = five_joint_scan(problem, at, int(goal), joints[i])
             continue
         posed = at_poses(problem, state, int(goal))
         if problem.joints < 7:
-            values[i], joints[i] = best_score(posed, int(configuration))
+            values[i], joints[i] = best_score(posed, at)
             continue
         clear = np.flatnonzero(gripper_contacts(posed)[state] == NO_CONTACT)
         if not clear.size:
             continue
-        tried = np.stack([np.full(clear.size, configuration), clear], axis=1)
+        tried = np.stack([np.zeros(clear.size, np.int64), clear], axis=1)
         found = np.empty((clear.size, 7))
-        of_poses = dense_scans(posed, tried, samples // 8, found)
+        of_poses = dense_scans(posed, at, tried, samples // 8, found)
         best = int(np.argmax(of_poses))
         values[i], joints[i] = of_poses[best], found[best]
     return values
 
 
-def best_score(posed: Problem, configuration: int) -> tuple[float, FloatArray]:
+def best_score(posed: Problem, row: Rows) -> tuple[float, FloatArray]:
     """Return the greatest score over the goals of a problem, and its joints; -1 for none."""
     count = posed.goal_p.shape[1]
     scores = Scores(
@@ -148,6 +149,6 @@ def best_score(posed: Problem, configuration: int) -> tuple[float, FloatArray]:
         np.full((1, count), -1.0, np.float32),
         np.zeros((1, count, 7), np.float32),
     )
-    score_slice(posed, gripper_contacts(posed), configuration, configuration + 1, scores)
+    score_rows(posed, gripper_contacts(posed), row, scores)
     best = int(np.argmax(scores.dexterity[0]))
     return float(scores.dexterity[0, best]), scores.joints[0, best].astype(np.float64)

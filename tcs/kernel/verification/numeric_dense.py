@@ -15,6 +15,7 @@ from tcs.kernel.numeric.arm import NumericArm, joint_ranges, numeric_arm_of
 from tcs.kernel.numeric.pairs import NOWHERE, bisect_contacts, choose
 from tcs.kernel.numeric.search import CurveSearch, find_candidates, new_curve_search, trace_from
 from tcs.kernel.problem import Problem
+from tcs.kernel.rows import Rows
 from tcs.kernel.views import unowned
 from tcs.kernel.workspace import Workspace, new_workspace
 
@@ -32,7 +33,7 @@ POINTS, CURVES, CANDIDATES = 16_384, 256, 65_536
 
 
 def numeric_dense_scans(
-    problem: Problem, pairs: IntArray, starts: int, joints: FloatArray
+    problem: Problem, rows: Rows, pairs: IntArray, starts: int, joints: FloatArray
 ) -> NDArray[np.float64]:
     """Return the dexterity of a collision-free solution for each pair, -1 where none is found.
 
@@ -43,9 +44,10 @@ def numeric_dense_scans(
     Contacts of base and gripper with the environment are not checked.
 
     Args:
-        problem: The scene, its goals and its grid.
-        pairs: Flat indices of initial configurations whose base is free of contact, and goals at
-            which the gripper is free of contact with the environment, shape (n, 2).
+        problem: The scene and its goals.
+        rows: Initial configurations.
+        pairs: Rows whose base is free of contact, and goals at which the gripper is free of contact
+            with the environment, shape (n, 2).
         starts: Number of postures to start from.
         joints: Filled with the joint angles of each solution [rad], shape (n, 7).
     """
@@ -56,8 +58,8 @@ def numeric_dense_scans(
     work, search = new_workspace(problem), new_curve_search(POINTS, CURVES, CANDIDATES)
     return np.array(
         [
-            _scan(problem, arm, work, search, h, g, postures, q)
-            for (h, g), q in zip(pairs, joints, strict=True)
+            _scan(problem, arm, work, search, rows, n, g, postures, q)
+            for (n, g), q in zip(pairs, joints, strict=True)
         ]
     )
 
@@ -68,15 +70,16 @@ def _scan(
     owned_arm: NumericArm,
     owned_work: Workspace,
     owned_search: CurveSearch,
-    configuration: int,
+    owned_rows: Rows,
+    row: int,
     goal: int,
     postures: FloatArray,
     joints: FloatArray,
 ) -> float:
     problem, arm = unowned(owned_problem), unowned(owned_arm)
-    work, search = unowned(owned_work), unowned(owned_search)
-    torso = configuration % problem.torso_levels
-    state = place_base(problem, work, configuration // problem.torso_levels)
+    work, search, rows = unowned(owned_work), unowned(owned_search), unowned(owned_rows)
+    state, torso = rows.state[row], rows.torso[row]
+    place_base(problem, work, rows, row)
     goal_in_arm_base(problem, work, state, torso, goal)
     body_A = problem.body_A[torso]
     if gripper_body_contact(problem, work, body_A) != NO_CONTACT:

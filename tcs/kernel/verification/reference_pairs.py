@@ -194,14 +194,7 @@ def placed_scene(
     scene: SceneArrays, grid: GridArrays, h: int, goal: int
 ) -> tuple[PlacedScene, bool]:
     """Return the scene with the robot at configuration h, and whether it is in contact at rest."""
-    shape = (
-        grid.environment_states,
-        len(grid.base_x),
-        len(grid.base_y),
-        len(grid.base_yaw),
-        grid.torso_levels,
-    )
-    state, x, y, yaw, torso = (int(i) for i in np.unravel_index(h, shape))
+    state, x, y, yaw, torso = (int(i) for i in np.unravel_index(h, grid.shape))
     X_WB = rot_z(grid.base_yaw[yaw]), np.array([grid.base_x[x], grid.base_y[y], 0.0])
     X_BA = scene.arm_base_R[torso], scene.arm_base_p[torso]
     X_AW = inverse(compose(X_WB, X_BA))

@@ -14,9 +14,9 @@ from tcs.errors import StoreFormatError
 from tcs.files.blocks import Blocks
 from tcs.files.compression import compress, decompress
 from tcs.kernel.arrays import IntArray
+from tcs.kernel.rows import Rows
 from tcs.model.people import Scale
 from tcs.placement.robustness.error_model import Offsets
-from tcs.placement.robustness.perturbed_scenes import BasePoses
 from tcs.placement.tables import Reason
 
 BLOCK = 100
@@ -41,7 +41,7 @@ class KeptPeople:
     def of(
         cls,
         blocks: Blocks,
-        poses: BasePoses,
+        poses: Rows,
         scales: Sequence[Mapping[str, Scale]],
         offsets: Offsets | None,
         *,

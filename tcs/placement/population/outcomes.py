@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tcs.errors import TcsError
 from tcs.kernel.arrays import IntArray
+from tcs.kernel.rows import Rows
 from tcs.kernel.sweep import gripper_contacts
 from tcs.model.people import Scale
 from tcs.model.scene import PeopleInScene, SceneSpec
@@ -22,7 +23,7 @@ from tcs.placement.population.kept_people import BLOCK, PROBES, KeptPeople
 from tcs.placement.population.problems import PersonProblems
 from tcs.placement.robustness.body_collisions import counted_pairs, counted_rests
 from tcs.placement.robustness.error_model import Offsets
-from tcs.placement.robustness.perturbed_scenes import BasePoses, PerturbedScenes, Run
+from tcs.placement.robustness.perturbed_scenes import PerturbedScenes, Run
 from tcs.placement.robustness.trials import ArmTrials, Progress, Trials
 
 CHUNK = 500
@@ -40,7 +41,7 @@ class _Prepared(NamedTuple):
 
     scenes: PeopleInScene
     problems: PersonProblems
-    poses: BasePoses
+    poses: Rows
     rows: IntArray
     """Rows of the configurations of this arm in the poses, shape (r,)."""
     place: IntArray
@@ -123,7 +124,7 @@ def reasons_for_people(
 
 def _kept(
     trials: Trials,
-    poses: BasePoses,
+    poses: Rows,
     scales: Sequence[dict[str, Scale]],
     offsets: Offsets | None,
 ) -> KeptPeople | None:
@@ -160,7 +161,7 @@ def _with_papers_man(arm: ArmTrials, trials: Trials) -> ArmTrials:
 
 def _prepared(
     trials: Trials,
-    poses: BasePoses,
+    poses: Rows,
     scales: Sequence[dict[str, Scale]],
     columns: IntArray,
     offsets: Offsets | None,

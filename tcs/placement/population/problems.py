@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tcs.kernel.arrays import FloatArray, GridArrays, SceneArrays
+from tcs.kernel.arrays import FloatArray, SceneArrays
 from tcs.kernel.collide import pack
 from tcs.kernel.groups import with_group_rows
 from tcs.kernel.problem import TOUCH, UNCHECKED, Problem, arm_order, build_problem
@@ -23,9 +23,7 @@ class PersonProblems:
             arrays: The scene with any person.
             measure: Name of the dexterity measure.
         """
-        states, origin = len(arrays.goal_p), np.zeros(1)
-        grid = GridArrays(states, origin, origin, origin, len(arrays.arm_base_p))
-        self._problem = problem = build_problem(arrays, grid, measure)
+        self._problem = problem = build_problem(arrays, measure)
         order = arm_order(arrays)
         self._pads = arrays.arm.pad[order], arrays.body.pad
         self._checked = arrays.arm_vs_environment[order], arrays.body_vs_environment
@@ -49,7 +47,6 @@ class PersonProblems:
             arm_radius=before.arm_radius + (widest - before.widest_gap),
             goal_R=np.array(arrays.goal_R),
             goal_p=np.array(arrays.goal_p),
-            environment_states=len(arrays.goal_p),
         )
 
     def _gaps(self, group: int, pad: FloatArray) -> FloatArray:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tcs.errors import TcsError
 from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
+from tcs.kernel.rows import single_row
 from tcs.model.grid import Grid
 from tcs.model.random_streams import named_generator
 from tcs.placement.refinement.joint_path import joint_path
@@ -198,8 +199,9 @@ def _with_path(scorer: PoseScorer, bases: list[ScoredBase]) -> tuple[ScoredBase,
     """Return the first of the best base poses with a joint path, or else the best without one."""
     for base in bases:
         served = np.flatnonzero(base.reached)
-        at = scorer.of_goals(served).at(base.values[None, :3])
-        path = joint_path(at, base.joints[served].astype(np.float64))
+        row = single_row(*base.values[:3])
+        problem = scorer.of_goals(served).problem
+        path = joint_path(problem, row, base.joints[served].astype(np.float64))
         if path is not None:
             return base, path
     return bases[0], None

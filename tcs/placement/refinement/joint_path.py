@@ -9,8 +9,9 @@ import numpy as np
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.kernel.motion.edges import certified
 from tcs.kernel.motion.postures import postures_at
-from tcs.kernel.motion.scene import motion_scene, new_motion_workspace
+from tcs.kernel.motion.scene import goal_from_arm_base, motion_scene, new_motion_workspace
 from tcs.kernel.problem import Problem
+from tcs.kernel.rows import Rows
 
 SAMPLES = 48
 """Values of the free joint at each pose."""
@@ -22,23 +23,24 @@ ATTEMPTS = 40
 """Paths that are tried, each without the postures and steps that blocked those before."""
 
 
-def joint_path(problem: Problem, through: FloatArray | None = None) -> FloatArray | None:
+def joint_path(problem: Problem, row: Rows, through: FloatArray | None = None) -> FloatArray | None:
     """Return a joint path through all goals of a problem in their order, None if none is found.
 
     Of all sequences of postures, one at each goal, the one with the least sum of squared steps is
     taken; each step, straight in joint space, is certified free of contact.
 
     Args:
-        problem: The scene with one initial configuration.
+        problem: The scene.
+        row: The initial configuration.
         through: Further posture at each goal [rad], shape (G, 7), e.g. the best ones of scoring.
 
     Returns:
         Joint angles [rad], shape (G, 7); continuous joints are not wrapped.
     """
-    layers = _layers(problem, through)
+    layers = _layers(problem, row, through)
     if any(not len(layer) for layer in layers):
         return None
-    motion = motion_scene(problem, 0)
+    motion = motion_scene(problem, row)
     work = new_motion_workspace(motion)
     periodic = motion.period > 0.0
     costs = [_costs(a, b, periodic) for a, b in itertools.pairwise(layers)]
@@ -64,19 +66,11 @@ def joint_path(problem: Problem, through: FloatArray | None = None) -> FloatArra
     return None
 
 
-def _layers(problem: Problem, through: FloatArray | None) -> list[FloatArray]:
+def _layers(problem: Problem, row: Rows, through: FloatArray | None) -> list[FloatArray]:
     """Return postures at each goal, shapes (n, 7)."""
-    yaw = float(problem.base_yaw[0])
-    R_WB = np.array(
-        [[np.cos(yaw), -np.sin(yaw), 0.0], [np.sin(yaw), np.cos(yaw), 0.0], [0.0, 0.0, 1.0]]
-    )
-    R_WA = R_WB @ problem.base_R[0]
-    p_WB = np.array([problem.base_x[0], problem.base_y[0], 0.0])
-    p_WA = p_WB + R_WB @ problem.base_p[0]
     layers = []
     for g in range(problem.goal_p.shape[1]):
-        R_AG = np.ascontiguousarray(R_WA.T @ problem.goal_R[0, g])
-        found = postures_at(problem, R_AG, R_WA.T @ (problem.goal_p[0, g] - p_WA), SAMPLES)
+        found = postures_at(problem, *goal_from_arm_base(problem, row, g), SAMPLES)
         found = found[:: max(1, -(-len(found) // MOST_POSTURES))]
         if through is not None:
             found = np.concatenate([found, through[g : g + 1]])

@@ -10,10 +10,11 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
-from tcs.kernel.arrays import BoolArray, FloatArray, GridArrays, IntArray
+from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
 from tcs.kernel.problem import Problem, build_problem
-from tcs.kernel.scores import Scores
-from tcs.kernel.sweep import gripper_contacts, score_slice
+from tcs.kernel.rows import Rows
+from tcs.kernel.scores import Scores, new_scores
+from tcs.kernel.sweep import gripper_contacts, score_rows
 from tcs.model.grid import ROBOT_AXES, Grid
 from tcs.model.scene import LoweredScene, Scene, environment_at, torso_at
 from tcs.placement.constraints import Footprint
@@ -105,7 +106,7 @@ class PointScorer:
             on_compile: Called first if the kernel has to be compiled.
         """
         for arm in self.arms:
-            problem = build_problem(arm.lowered.arrays, arm.lowered.grid, self.measure)
+            problem = build_problem(arm.lowered.arrays, self.measure)
             scorer = None if arm.lines is None else ApproachScorer(problem, arm.lines)
             warm_up(problem, on_compile, scorer)
 
@@ -136,7 +137,7 @@ class PointScorer:
         for number, arm in enumerate(self.arms):
             rows = points.arm == number
             pair = found.contact[rows]
-            problem = build_problem(arm.lowered.arrays, arm.lowered.grid, self.measure)
+            problem = build_problem(arm.lowered.arrays, self.measure)
             of_arm = name_contacts(pair, arm.lowered, problem)
             found.contact[rows] = np.where(pair >= 0, pair + len(names), -1)
             names.extend(of_arm)
@@ -189,23 +190,16 @@ class PointScorer:
         problem = self._problem(arm, states, levels)
         grippers = gripper_contacts(problem)
         approaches = None if arm.lines is None else ApproachScorer(problem, arm.lines)
-        base = self._columns(chosen, "base_x", "base_y", "base_yaw")
-        index = state.ravel() * levels.size + level
+        x, y, yaw = self._columns(chosen, "base_x", "base_y", "base_yaw").T
+        at = Rows(state.ravel(), x, y, yaw, level.ravel())
 
         def score_batch(start: int) -> None:
-            for i in range(start, min(start + BATCH, rows.size)):
-                at = problem._replace(
-                    base_x=base[i, :1].copy(),
-                    base_y=base[i, 1:2].copy(),
-                    base_yaw=base[i, 2:].copy(),
-                )
-                row = slice(rows[i], rows[i] + 1)
-                part = Scores(
-                    found.reason[row], found.contact[row], found.dexterity[row], found.joints[row]
-                )
-                score_slice(at, grippers, int(index[i]), int(index[i]) + 1, part)
-                if approaches is not None:
-                    approaches.score_slice(at, int(index[i]), part)
+            part = slice(start, start + BATCH)
+            scores = new_scores(rows[part].size, self.goals)
+            score_rows(problem, grippers, at.at(part), scores)
+            if approaches is not None:
+                approaches.score_rows(problem, at.at(part), scores)
+            found.put(rows[part], scores)
 
         Parallel(n_jobs=self.jobs, prefer="threads")(
             delayed(score_batch)(start) for start in range(0, rows.size, BATCH)
@@ -223,6 +217,4 @@ class PointScorer:
         arrays = moved._replace(
             arm_base_R=raised.arm_base_R, arm_base_p=raised.arm_base_p, body=raised.body
         )
-        origin = np.zeros(1)
-        grid = GridArrays(len(states), origin, origin, origin, levels.size)
-        return build_problem(arrays, grid, self.measure)
+        return build_problem(arrays, self.measure)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
@@ -12,8 +11,9 @@ from joblib import Parallel, delayed
 
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.problem import Problem, build_problem
-from tcs.kernel.scores import Scores
-from tcs.kernel.sweep import gripper_contacts, score_slice
+from tcs.kernel.rows import Rows
+from tcs.kernel.scores import new_scores
+from tcs.kernel.sweep import gripper_contacts, score_rows
 from tcs.model.grid import Grid
 from tcs.model.robots import RobotFile
 from tcs.model.scene import EMPTY_ENVIRONMENT, Scene, SceneSpec, lower
@@ -33,7 +33,7 @@ class PoseScorer:
     """Scores base poses of a robot among boxes for poses of its tool, at one torso height."""
 
     problem: Problem
-    """The scene, with the tool poses as goals and a single base pose."""
+    """The scene, with the tool poses as goals."""
     grippers: IntArray
     """Contacts of the gripper with the boxes at each goal, shape (1, G)."""
     grid: Grid
@@ -60,46 +60,23 @@ class PoseScorer:
         grippers = np.ascontiguousarray(self.grippers[:, chosen])
         return type(self)(problem, grippers, self.grid, self.jobs)
 
-    def at(self, base: FloatArray) -> Problem:
-        """Return the problem at base poses that differ in x alone, shape (n, 3): x, y, yaw."""
-        return self.problem._replace(
-            base_x=base[:, 0].copy(), base_y=base[:1, 1].copy(), base_yaw=base[:1, 2].copy()
-        )
-
     def score(self, points: Points) -> PointScores:
         """Return the scores of base poses."""
-        shape = (len(points.values), self.problem.goal_p.shape[1])
-        found = Scores(
-            reason=np.empty(shape, np.uint8),
-            contact=np.empty(shape, np.int32),
-            dexterity=np.zeros(shape, np.float32),
-            joints=np.zeros((*shape, 7), np.float32),
-        )
+        count, goals = len(points.values), self.problem.goal_p.shape[1]
+        x, y, yaw = points.values[:, :3].T
+        one = np.zeros(count, np.int64)
+        rows, found = Rows(one, x, y, yaw, one), new_scores(count, goals)
 
-        # Base poses that differ in x alone are configurations of one problem: sorted by the others,
-        # they follow each other.
-        base = points.values[:, :3]
-        order = np.lexsort(base.T)
-        apart = np.any(np.diff(base[order, 1:], axis=0) != 0.0, axis=1)
-        first = np.union1d(np.flatnonzero(np.r_[True, apart]), np.arange(0, shape[0], BATCH))
-
-        def score_batch(start: int, stop: int) -> None:
-            rows = order[start:stop]
-            part = Scores(
-                found.reason[start:stop],
-                found.contact[start:stop],
-                found.dexterity[start:stop],
-                found.joints[start:stop],
-            )
-            score_slice(self.at(base[rows]), self.grippers, 0, len(rows), part)
+        def score_batch(start: int) -> None:
+            part = slice(start, start + BATCH)
+            score_rows(self.problem, self.grippers, rows.at(part), found.part(part))
 
         Parallel(n_jobs=self.jobs, prefer="threads")(
-            delayed(score_batch)(*ends) for ends in itertools.pairwise([*first, shape[0]])
+            delayed(score_batch)(start) for start in range(0, count, BATCH)
         )
         reached = found.reason == Reason.REACHED
         found.dexterity[~reached], found.joints[~reached] = 0.0, 0.0
-        back = np.argsort(order)
-        return PointScores(reached[back], found.dexterity[back], found.joints[back])
+        return PointScores(reached, found.dexterity, found.joints)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +105,7 @@ class PoseScene:
             }
         )
         lowered = lower(scene, None, grid)
-        problem = build_problem(lowered.arrays, lowered.grid, measure)
+        problem = build_problem(lowered.arrays, measure)
         warm_up(problem)
         reach = float(np.linalg.norm(problem.chain_p[1:], axis=1).sum())
         offset = float(np.linalg.norm(problem.chain_p[0]))

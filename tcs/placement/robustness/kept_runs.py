@@ -12,9 +12,10 @@ import numpy as np
 from tcs.files.blocks import Blocks
 from tcs.files.compression import compress, decompress
 from tcs.kernel.arrays import BoolArray, FloatArray
+from tcs.kernel.rows import Rows
 from tcs.model.program import program_digest
 from tcs.model.scene import LoweredScene
-from tcs.placement.robustness.perturbed_scenes import BasePoses, PerturbedScenes, Run
+from tcs.placement.robustness.perturbed_scenes import PerturbedScenes, Run
 
 if TYPE_CHECKING:
     from tcs.kernel.approach.sweep import ApproachLines
@@ -71,7 +72,7 @@ def kept_runs(
     blocks: Blocks,
     states: str,
     scenes: Callable[[], PerturbedScenes],
-    poses: BasePoses,
+    poses: Rows,
     runs: Sequence[Run],
     jobs: int,
 ) -> Iterator[tuple[Run, BoolArray]]:
@@ -109,7 +110,7 @@ def _grouped(runs: Sequence[Run]) -> Iterator[list[Run]]:
         yield part
 
 
-def _name(states: str, poses: BasePoses, runs: Sequence[Run]) -> str:
+def _name(states: str, poses: Rows, runs: Sequence[Run]) -> str:
     """Return the name of the block of some runs."""
     rows = np.array([run.row for run in runs], dtype=np.int64)
     sha = hashlib.sha256(states.encode())

@@ -11,14 +11,15 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
-from tcs.kernel.arrays import BoolArray, GridArrays
+from tcs.kernel.arrays import BoolArray
 from tcs.kernel.problem import Problem, build_problem, with_environment
+from tcs.kernel.rows import Rows
 from tcs.kernel.sweep import blocked_grippers, gripper_contacts
 from tcs.model.grid import ROBOT_AXES
 from tcs.model.scene import environment_at, torso_at
 from tcs.placement.robustness.displacements import displaced, samples_of
 from tcs.placement.robustness.error_model import Offsets
-from tcs.placement.robustness.perturbed_scenes import BasePoses, PerturbedScenes, Run
+from tcs.placement.robustness.perturbed_scenes import PerturbedScenes, Run
 from tcs.placement.robustness.trials import ArmTrials, Trials
 from tcs.placement.scoring.approaches import ApproachScorer
 from tcs.placement.tables import Points, Reason
@@ -98,9 +99,7 @@ class PerturbedPoints:
         """
         free = np.zeros((self.samples, self.trials.weights.size), dtype=np.bool_)
         for arm in self.trials.arms:
-            problem = build_problem(
-                arm.lowered.arrays, arm.lowered.grid, str(self.trials.file.metadata["measure"])
-            )
+            problem = build_problem(arm.lowered.arrays, str(self.trials.file.metadata["measure"]))
             free |= ~blocked_grippers(self._scenes(arm, problem, dict(state)).problem)
         return free
 
@@ -113,11 +112,9 @@ class PerturbedPoints:
         levels, level = np.unique(torso, return_inverse=True)
         arrays = torso_at(arm.lowered, arm.scene, levels)
         arrays = arrays._replace(body_vs_environment=arm.body_pairs)
-        origin = np.zeros(1)
-        grid = GridArrays(len(arrays.goal_p), origin, origin, origin, levels.size)
-        robot = build_problem(arrays, grid, str(trials.file.metadata["measure"]))
+        robot = build_problem(arrays, str(trials.file.metadata["measure"]))
         approaches = None if arm.lines is None else ApproachScorer(robot, arm.lines)
-        poses = BasePoses(np.zeros(rows.size, dtype=np.int64), x, y, yaw, level)
+        poses = Rows(np.zeros(rows.size, dtype=np.int64), x, y, yaw, level)
         axes = trials.grid.environment_axes
         states, state = np.unique(values[:, : len(axes)], axis=0, return_inverse=True)
         for number, at in enumerate(states):
@@ -151,12 +148,7 @@ class PerturbedPoints:
                 self.environments.pop(next(iter(self.environments)))
         self.environments[key] = known
         of = known.problem
-        problem = robot._replace(
-            environment=of.environment,
-            goal_R=of.goal_R,
-            goal_p=of.goal_p,
-            environment_states=of.environment_states,
-        )
+        problem = robot._replace(environment=of.environment, goal_R=of.goal_R, goal_p=of.goal_p)
         return PerturbedScenes(problem, known.grippers)
 
 
@@ -164,7 +156,7 @@ class _Part(NamedTuple):
     """One configuration in some of the samples."""
 
     scenes: PerturbedScenes
-    poses: BasePoses
+    poses: Rows
     run: Run
     row: int
     """Number of the configuration."""

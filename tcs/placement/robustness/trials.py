@@ -15,8 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from tcs.errors import SelectionError, TcsError
 from tcs.files.blocks import BlockFolder, Blocks, opened_if
-from tcs.kernel.arrays import BoolArray, FloatArray, GridArrays, IntArray
+from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
 from tcs.kernel.problem import build_problem
+from tcs.kernel.rows import Rows
 from tcs.kernel.scores import Scores
 from tcs.kernel.sweep import gripper_contacts
 from tcs.model.grid import Grid
@@ -29,7 +30,7 @@ from tcs.placement.robustness.body_collisions import (
 from tcs.placement.robustness.displacements import displaced, samples_of
 from tcs.placement.robustness.error_model import ErrorModel, Offsets
 from tcs.placement.robustness.kept_runs import kept_runs, states_digest, trials_key
-from tcs.placement.robustness.perturbed_scenes import BATCH, BasePoses, PerturbedScenes, Run
+from tcs.placement.robustness.perturbed_scenes import BATCH, PerturbedScenes, Run
 from tcs.placement.scoring.approaches import ApproachScorer, approach_lines
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.kernel_start import KernelStart
@@ -75,12 +76,9 @@ class ArmTrials:
             lowered: The scene with the torso heights.
             measure: Name of the dexterity measure.
         """
-        samples = samples_of(positions)
         arrays = environment_at(lowered, self.scene, self.job.task, _states(positions))
         arrays = arrays._replace(body_vs_environment=self.body_pairs)
-        origin = np.zeros(1)
-        grid = GridArrays(samples, origin, origin, origin, len(arrays.arm_base_p))
-        problem = build_problem(arrays, grid, measure)
+        problem = build_problem(arrays, measure)
         return PerturbedScenes(problem, gripper_contacts(problem), self.approaches)
 
     @cached_property
@@ -88,7 +86,7 @@ class ArmTrials:
         """Scores the approaches of the goals, whatever the state of the environment."""
         if self.lines is None:
             return None
-        return ApproachScorer(build_problem(self.lowered.arrays, self.lowered.grid), self.lines)
+        return ApproachScorer(build_problem(self.lowered.arrays), self.lines)
 
     def arrays_digest(self, positions: Mapping[str, FloatArray]) -> str:
         """Return the hash of the scene with its environment in other states.
@@ -158,7 +156,7 @@ class Trials:
         measure = str(file.metadata["measure"])
         trials = cls.built(file, chosen, built, errors, body_collisions)
         start = KernelStart(
-            lambda: (build_problem(lowered.arrays, lowered.grid, measure) for *_, lowered in built),
+            lambda: (build_problem(lowered.arrays, measure) for *_, lowered in built),
             on_compile,
             trials.arms[0].approaches,
         )
@@ -385,7 +383,7 @@ class Trials:
             beyond |= self.positions(int(number), offsets)[1] & (state == number).any(axis=1)
         return int(np.count_nonzero(beyond))
 
-    def poses(self, members: ArrayLike) -> BasePoses:
+    def poses(self, members: ArrayLike) -> Rows:
         """Return the base poses of configurations, given by flat index.
 
         Raises:
@@ -394,7 +392,7 @@ class Trials:
         grid = self.grid
         flat = np.asarray(members, dtype=np.int64)
         at = grid.values(flat)
-        return BasePoses(
+        return Rows(
             state=flat // self.scored.sets.state_size,
             x=at["base_x"],
             y=at["base_y"],
@@ -406,7 +404,7 @@ class Trials:
         """Return the positions of the joints of a state without error, by name [m or rad].
 
         Args:
-            state: Number of arm and environment state, as in `BasePoses`.
+            state: Number of arm and environment state, as in `Rows`.
         """
         axes = self.grid.environment_axes
         of_arm = state % (self.grid.arm_size // self.grid.state_size)
@@ -420,7 +418,7 @@ class Trials:
         """Return joint positions in each sample, and whether a joint was held at its limit.
 
         Args:
-            state: Number of arm and environment state, as in `BasePoses`.
+            state: Number of arm and environment state, as in `Rows`.
             offsets: Errors of the joints, shapes (samples,).
         """
         arm = self.arms[0]
@@ -438,7 +436,7 @@ class Trials:
         return arm.scenes(positions, arm.lowered, self._measure)
 
     def _found(
-        self, state: int, offsets: Offsets, poses: BasePoses, runs: list[Run], jobs: int
+        self, state: int, offsets: Offsets, poses: Rows, runs: list[Run], jobs: int
     ) -> Iterator[tuple[Run, BoolArray]]:
         """Yield the goals that each run reaches in one state of the environment."""
         if self.blocks is None:

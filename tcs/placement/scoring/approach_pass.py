@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from tcs.files.blocks import BlockFolder, Blocks, opened_if
 from tcs.files.mapped import release
+from tcs.kernel.arrays import GridArrays
+from tcs.kernel.scores import JOINTS
 from tcs.placement.scoring import engines
 from tcs.placement.scoring.approaches import ApproachScorer
 from tcs.placement.scoring.blocks import Block, Kept
-from tcs.placement.scoring.engines.work import JOINTS
 
 if TYPE_CHECKING:
     from tcs.kernel.approach.sweep import ApproachLines
@@ -42,6 +43,7 @@ class GridScores(NamedTuple):
 def score_grid(
     scores: GridScores,
     scorer: ApproachScorer,
+    grid: GridArrays,
     *,
     jobs: int,
     ensure: Callable[[], None],
@@ -54,6 +56,7 @@ def score_grid(
     Args:
         scores: The scores, replaced; in blocks, if there is a folder of them.
         scorer: Scores the approaches.
+        grid: The configurations.
         jobs: Number of threads; the scores do not depend on it.
         ensure: Starts the kernel; called if something has to be scored.
         blocks: Folder to keep finished blocks in, and to take them from; None to keep none.
@@ -70,7 +73,7 @@ def score_grid(
     with opened_if(blocks, lambda: approaches_key(key(), scorer.lines)) as opened:
         if opened is None:
             ensure()
-            return scorer.score(reason, contact, dexterity, scores.winning, jobs=jobs)
+            return scorer.score(grid, reason, contact, dexterity, scores.winning, jobs=jobs)
         kept, remaining = kept_of(opened), {}
         for part in sorted(joints):
             rows = slice(part.start, part.stop)
@@ -78,7 +81,7 @@ def score_grid(
             if block is None:
                 ensure()
                 here = reason[rows], contact[rows], dexterity[rows]
-                found = scorer.score(*here, joints[part], jobs=jobs, first=part.start)
+                found = scorer.score(grid, *here, joints[part], jobs=jobs, first=part.start)
                 block = Block(*here, found)
                 kept.save(part.start, block)
             reason[rows], contact[rows], dexterity[rows] = block[:3]

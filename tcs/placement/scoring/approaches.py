@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 from tcs.errors import ArmClassError, RobotError
 from tcs.files.mapped import chunks
 from tcs.kernel.analytic.solver import any_solver, is_outside
+from tcs.kernel.arrays import GridArrays
 from tcs.kernel.problem import Problem
-from tcs.kernel.scores import REACHED, Scores
+from tcs.kernel.rows import Rows, no_rows, rows_at
+from tcs.kernel.scores import REACHED, Scores, new_scores
 from tcs.model.scene import Scene, arm_chain
 from tcs.model.tasks import TOOL_SPEED
 from tcs.placement.scoring.job import Job
@@ -26,7 +28,7 @@ from tcs.placement.store import APPROACH, WITHOUT_APPROACH
 if TYPE_CHECKING:
     from tcs.kernel.approach.memory import Approach
     from tcs.kernel.approach.scene import LineScene
-    from tcs.kernel.approach.sweep import ApproachLines
+    from tcs.kernel.approach.sweep import ApproachLines, ReachedPairs
 
 SLICE = 512
 """Reached pairs per slice: tens of milliseconds of work."""
@@ -122,7 +124,7 @@ class ApproachScorer:
     """Scoring of the approaches of a problem, after all else."""
 
     problem: Problem
-    """The scene, its goals and its grid."""
+    """The scene and its goals."""
     lines: ApproachLines
     """The approaches of the goals."""
     _of_thread: threading.local = field(default_factory=threading.local, repr=False)
@@ -138,19 +140,16 @@ class ApproachScorer:
 
     def warm_up(self) -> float:
         """Compile the kernel or load its machine code; return the time this took [s]."""
+        from tcs.kernel.approach.sweep import score_approaches
+
         begun = time.perf_counter()
-        empty = np.empty((0, self.problem.goal_p.shape[1]))
-        self.score(
-            empty.astype(np.uint8),
-            empty.astype(np.int32),
-            empty.astype(np.float32),
-            np.empty((0, 7), np.float32),
-            jobs=1,
-        )
+        none = _pairs_of(new_scores(0, self.problem.goal_p.shape[1]))
+        score_approaches(self.problem, self.lines, no_rows(), none, self.memory())
         return time.perf_counter() - begun
 
     def score(
         self,
+        grid: GridArrays,
         reason: NDArray[np.uint8],
         contact: NDArray[Any],
         dexterity: NDArray[np.float32],
@@ -162,6 +161,7 @@ class ApproachScorer:
         """Replace the scores of reached pairs by those of their best approachable postures.
 
         Args:
+            grid: The grid of the configurations.
             reason: Reasons, replaced where no posture is approachable, shape (H, G).
             contact: Contact codes, replaced where the approach is blocked, shape (H, G).
             dexterity: Replaced where another posture is the best, shape (H, G).
@@ -183,11 +183,13 @@ class ApproachScorer:
         def part(start: int) -> ReachedPairs:
             chosen = slice(start, start + SLICE)
             at = rows[chosen], columns[chosen]
+            configurations, row = np.unique(rows[chosen], return_inverse=True)
             scores = ReachedPairs(
-                pairs[chosen] + np.array([first, 0]), reason[at], contact[at].astype(np.int32),
-                dexterity[at], joints[chosen].copy(),
+                np.stack([row, columns[chosen]], axis=1), reason[at],
+                contact[at].astype(np.int32), dexterity[at], joints[chosen].copy(),
             )  # fmt: skip
-            score_approaches(self.problem, self.lines, scores, self.memory())
+            at_rows = rows_at(grid, first + configurations)
+            score_approaches(self.problem, self.lines, at_rows, scores, self.memory())
             return scores
 
         found = Parallel(n_jobs=jobs, prefer="threads")(
@@ -200,31 +202,21 @@ class ApproachScorer:
         kept: NDArray[np.float32] = scores.joints[scores.reason == 0]
         return kept
 
-    def score_slice(
-        self, problem: Problem, start: int, scores: Scores, *, torso: int | None = None
-    ) -> None:
-        """Replace the scores of consecutive configurations by those with approach, in this thread.
+    def score_rows(self, problem: Problem, rows: Rows, scores: Scores) -> None:
+        """Replace the scores of configurations by those with approach, in this thread.
 
         Args:
-            problem: The problem of this scorer, with its environment in other states, or with
-                another grid of base poses.
-            start: Flat index of the first configuration.
-            scores: Their scores, as `tcs.kernel.sweep.score_slice` fills them.
-            torso: The torso level that is the only one of `problem`; None if it has all of them.
+            problem: The problem of this scorer, or with its environment in other states.
+            rows: The configurations.
+            scores: Their scores, as `tcs.kernel.sweep.score_rows` fills them.
         """
-        from tcs.kernel.approach.sweep import ReachedPairs, score_approaches
+        from tcs.kernel.approach.sweep import score_approaches
 
-        rows, columns = at = np.nonzero(scores.reason == REACHED)
-        if not rows.size:
+        at = np.nonzero(scores.reason == REACHED)
+        if not at[0].size:
             return
-        memory = self.memory()
-        if torso is not None:
-            memory = memory._replace(moved=memory.moved[torso : torso + 1])
-        pairs = ReachedPairs(
-            np.stack([rows + start, columns], axis=1), scores.reason[at], scores.contact[at],
-            scores.dexterity[at], scores.joints[at],
-        )  # fmt: skip
-        score_approaches(problem, self.lines, pairs, memory)
+        pairs = _pairs_of(scores)
+        score_approaches(problem, self.lines, rows, pairs, self.memory())
         scores.reason[at], scores.contact[at] = pairs.reason, pairs.contact
         scores.dexterity[at], scores.joints[at] = pairs.dexterity, pairs.joints
 
@@ -238,3 +230,14 @@ class ApproachScorer:
             self._of_thread.memory = new_approach(self.problem, scene)
         found: Approach = self._of_thread.memory
         return found
+
+
+def _pairs_of(scores: Scores) -> ReachedPairs:
+    """Return the reached pairs of some scores."""
+    from tcs.kernel.approach.sweep import ReachedPairs
+
+    at = np.nonzero(scores.reason == REACHED)
+    pair = np.stack(at, axis=1)
+    return ReachedPairs(
+        pair, scores.reason[at], scores.contact[at], scores.dexterity[at], scores.joints[at]
+    )

@@ -73,10 +73,10 @@ def estimate(
     scene = job.scene()
     choice = choose_approach(approach, [(job, scene)])
     lowered = job.lowered(scene)
-    problem = build_problem(lowered.arrays, lowered.grid, measure)
+    problem = build_problem(lowered.arrays, measure)
     scorer = ApproachScorer(problem, approach_lines(job)) if choice.is_scored else None
     warm_up(problem, approaches=scorer)
-    work = Work(problem, gripper_contacts(problem))
+    work = Work(problem, lowered.grid, gripper_contacts(problem))
     size = job.scored_grid.size
     starts = np.unique(np.linspace(0, max(0, size - SLICE), slices).astype(int))
     scored = [
@@ -103,7 +103,7 @@ def scored_slice(work: Work, part: Part, approaches: ApproachScorer | None = Non
     begun = time.thread_time()
     block = work.score(part)
     if approaches is not None:
-        block = block._replace(joints=approaches.score(*block, jobs=1, first=part.start))
+        block = block._replace(joints=approaches.score(work.grid, *block, jobs=1, first=part.start))
     seconds = time.thread_time() - begun
     return ScoredSlice(len(block.reason), seconds, block.joints.nbytes, _stored_bytes(block))
 

@@ -12,6 +12,7 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from tcs.kernel.problem import Problem
+from tcs.kernel.rows import rows_at
 from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scans
 from tcs.model.tasks import partners
 from tcs.placement.scoring.drake_check import DrakeChecker, Finding, of_both
@@ -229,8 +230,12 @@ class FileChecker:
         if partner is not None:
             return self._scan_together(part, first, self.scored(part[0][0], partner)[0])
         scored = np.array([self.scored(h, g)[1:] for h, g in part])
-        joints = np.empty((len(part), 7))
-        values = dense_scans(self.problems[first], scored, DENSE_SAMPLES, joints)
+        rows, joints = (
+            rows_at(self.hands.lowered[first].grid, scored[:, 0]),
+            np.empty((len(part), 7)),
+        )
+        pairs = np.stack([np.arange(len(part)), scored[:, 1]], axis=1)
+        values = dense_scans(self.problems[first], rows, pairs, DENSE_SAMPLES, joints)
         return [Posture(float(v), q, None) for v, q in zip(values, joints, strict=True)]
 
     def _scan_together(self, part: Pairs, first: int, second: int) -> list[Posture]:
@@ -245,7 +250,7 @@ class FileChecker:
             goals = goal, self.scored(h, partner)[2]
             best = searched(
                 two,
-                scored,
+                rows_at(self.hands.lowered[first].grid, [scored]),
                 goals,
                 (none, none),
                 finest=DENSE_SAMPLES_OF_TWO,

@@ -9,9 +9,10 @@ from dataclasses import dataclass, field
 from tcs.kernel.analytic.solver import is_outside
 from tcs.kernel.cache import announced
 from tcs.kernel.problem import Problem
-from tcs.kernel.sweep import gripper_contacts
+from tcs.kernel.rows import no_rows
+from tcs.kernel.scores import new_scores
+from tcs.kernel.sweep import gripper_contacts, score_rows
 from tcs.placement.scoring.approaches import ApproachScorer
-from tcs.placement.scoring.engines import Work
 
 ANALYTIC, NUMERIC = "analytic", "numeric"
 """Solution of the inverse kinematics: in closed form, or by Newton's method from many starts."""
@@ -61,6 +62,7 @@ def warm_up(
     """
     begun = time.perf_counter()
     with announced(on_compile):
-        Work(problem, gripper_contacts(problem)).warm_up()
+        nothing = new_scores(0, problem.goal_p.shape[1])
+        score_rows(problem, gripper_contacts(problem), no_rows(), nothing)
         seconds = time.perf_counter() - begun
         return seconds + (0.0 if approaches is None else approaches.warm_up())

@@ -79,7 +79,7 @@ class LiveScorer:
         )  # fmt: skip
         lowered = self._job_at({}).lowered(self._setup.scene)
         self._scene_in_use = threading.Lock()
-        problem = build_problem(lowered.arrays, lowered.grid, measure)
+        problem = build_problem(lowered.arrays, measure)
         is_scored = self._setup.approach.is_scored
         scorer = ApproachScorer(problem, approach_lines(self.job)) if is_scored else None
         warm_up(problem, on_compile, scorer)

@@ -17,13 +17,13 @@ from tcs.files.blocks import BlockFolder, Blocks
 from tcs.files.mapped import chunks, large_zeros, release
 from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.kernel.problem import Problem, build_problem
+from tcs.kernel.scores import JOINTS
 from tcs.kernel.sweep import gripper_contacts
 from tcs.model.scene import LoweredScene
 from tcs.placement.scoring.approach_pass import GridScores, score_grid
 from tcs.placement.scoring.approaches import ApproachScorer
 from tcs.placement.scoring.blocks import BLOCK, Block, Kept, key_of
 from tcs.placement.scoring.engines import Part, ScoringEngine, Threads, Work
-from tcs.placement.scoring.engines.work import JOINTS
 from tcs.placement.scoring.kernel_start import KernelStart, ik_of
 from tcs.placement.scoring.shared_blocks import Manifest, Shared, joined, with_goals
 from tcs.placement.tables import ScoreTable
@@ -94,10 +94,10 @@ def sweep(
     """
     if jobs < 1:
         raise TcsError(f"jobs is {jobs}; must be 1 or more threads.")
-    problem = build_problem(lowered.arrays, lowered.grid, measure)
+    problem = build_problem(lowered.arrays, measure)
     scorer = None if approaches is None else ApproachScorer(problem, approaches)
     start = KernelStart(lambda: [problem], on_compile, scorer)
-    size, goals = _size(problem), problem.goal_p.shape[1]
+    size, goals = lowered.grid.size, problem.goal_p.shape[1]
     begun = time.perf_counter()
     reason: NDArray[np.uint8] = large_zeros((size, goals), np.uint8)
     contact: NDArray[Any] = large_zeros((size, goals), _code_type(problem))
@@ -110,8 +110,8 @@ def sweep(
         of_goals = problem
         if some_goals is not None:
             arrays = with_goals(lowered, some_goals).arrays
-            of_goals = build_problem(arrays, lowered.grid, measure)
-        return Work(of_goals, gripper_contacts(of_goals), excluded)
+            of_goals = build_problem(arrays, measure)
+        return Work(of_goals, lowered.grid, gripper_contacts(of_goals), excluded)
 
     with (
         _opened(blocks, problem, lambda: Manifest.of(lowered, measure, excluded)) as found,
@@ -134,6 +134,7 @@ def sweep(
         winning = score_grid(
             scores,
             scorer,
+            lowered.grid,
             jobs=jobs,
             ensure=start.ensure,
             blocks=blocks,
@@ -162,12 +163,6 @@ def sweep(
         ik=ik_of(problem),
         approach_seconds=done_at - approach_begun - (start.seconds - compiled),
     )
-
-
-def _size(problem: Problem) -> int:
-    """Return the number of configurations of the grid."""
-    base_poses = problem.base_x.size * problem.base_y.size * problem.base_yaw.size
-    return int(problem.environment_states * base_poses * problem.torso_levels)
 
 
 class _Found(NamedTuple):

@@ -12,6 +12,7 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from tcs.kernel.problem import Problem, build_problem
+from tcs.kernel.rows import Rows, rows_at
 from tcs.model.scene import LoweredScene
 from tcs.placement.tables import Reason, ScoreTable
 
@@ -49,7 +50,7 @@ class Hands:
     @cached_property
     def problems(self) -> tuple[Problem, ...]:
         """The problem of each hand."""
-        return tuple(build_problem(one.arrays, one.grid, self.measure) for one in self.lowered)
+        return tuple(build_problem(one.arrays, self.measure) for one in self.lowered)
 
     def two(self, first: int, second: int) -> TwoArms:
         """Return two of the hands, with memory of their own."""
@@ -181,14 +182,14 @@ def _pairs_of_postures(
 ) -> list[_Found]:
     """Return the best pair of postures of each configuration that reaches both goals."""
     two = hands.two(a.hand, b.hand)
-    torsos = (configurations % two.problems[0].torso_levels).astype(np.int64)
-    bodies = two.contacts(torsos, first, second)
+    rows = rows_at(hands.lowered[a.hand].grid, configurations)
+    bodies = two.contacts(rows.torso, first, second)
     is_posed = not any(
         len(hands.lowered[hand].arrays.freedom) and np.any(hands.lowered[hand].arrays.freedom[goal])
         for hand, goal in (a, b)
     )
     found = []
-    for n, h in enumerate(configurations.tolist()):
+    for n in range(len(configurations)):
         if bodies[n, 0] < 0:
             found.append(_Found((first[n], second[n]), None, bodies[n]))
             continue
@@ -197,7 +198,7 @@ def _pairs_of_postures(
             found.append(_Found(None, None, bodies[n]))
             continue
         known = first[n : n + 1], second[n : n + 1]
-        best = searched(two, h, (a.goal, b.goal), known)
+        best = searched(two, rows.at(slice(n, n + 1)), (a.goal, b.goal), known)
         value, joints = (None, None) if best is None else (best[0], best[1:])
         found.append(_Found(joints, value, bodies[n]))
     return found
@@ -205,7 +206,7 @@ def _pairs_of_postures(
 
 def searched(
     two: TwoArms,
-    h: int,
+    row: Rows,
     goals: tuple[int, int],
     known: tuple[NDArray[np.float64], NDArray[np.float64]],
     *,
@@ -219,15 +220,15 @@ def searched(
 
     Args:
         two: The two arms.
-        h: Index of the configuration in the scored grid.
+        row: The configuration.
         goals: The goal of each arm.
         known: A free posture of each arm by itself [rad], shape (0 or 1, 7).
         finest: Greatest number of values of each free joint.
         most: Number of postures of an arm that the finer samples should not exceed.
     """
-    best = two.best_pair(h, goals, known, FIRST_SAMPLES)
+    best = two.best_pair(row, goals, known, FIRST_SAMPLES)
     if best is not None:
         return best
-    counts = [len(two.postures(k, h, goals[k], known[k], FIRST_SAMPLES)[0]) for k in range(2)]
+    counts = [len(two.postures(k, row, goals[k], known[k], FIRST_SAMPLES)[0]) for k in range(2)]
     samples = min(finest, FIRST_SAMPLES * most // max(*counts, 1))
-    return two.best_pair(h, goals, known, samples) if samples > FIRST_SAMPLES else None
+    return two.best_pair(row, goals, known, samples) if samples > FIRST_SAMPLES else None

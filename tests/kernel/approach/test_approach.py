@@ -10,6 +10,7 @@ from tcs.kernel.approach.sweep import ApproachLines, ReachedPairs, approach_spli
 from tcs.kernel.arrays import SPHERE
 from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.problem import build_problem
+from tcs.kernel.rows import grid_rows, rows_at
 from tcs.kernel.scores import APPROACH_BLOCKED, APPROACH_LIMITS, REACHED
 from tcs.kernel.verification.reference import link_poses
 from tcs.kernel.verification.reference_motion import least_excess
@@ -48,7 +49,7 @@ def approached(scene, scores, **changes):
     found = ReachedPairs(
         pairs, scores.reason[at], scores.contact[at], scores.dexterity[at], scores.joints[at]
     )
-    score_approaches(build_problem(scene, GRID), lines(scene, **changes), found)
+    score_approaches(build_problem(scene), lines(scene, **changes), grid_rows(GRID), found)
     return found
 
 
@@ -73,10 +74,10 @@ def test_every_outcome_occurs_and_the_best_posture_stays_where_it_is_approachabl
 
 
 def test_approaches_are_straight_within_limits_and_free_by_the_reference(scene, found):
-    problem, chain = build_problem(scene, GRID), scene.chain
+    problem, chain = build_problem(scene), scene.chain
     for n in np.flatnonzero(found.reason == REACHED)[:3]:
         h, g = map(int, found.pair[n])
-        spline = approach_spline(problem, lines(scene), h, g, found.joints[n])
+        spline = approach_spline(problem, lines(scene), rows_at(GRID, [h]), g, found.joints[n])
         assert spline is not None
         points, tangents = spline
         np.testing.assert_allclose(points[-1], found.joints[n], atol=1e-5)
@@ -109,8 +110,8 @@ def test_an_obstacle_on_the_line_alone_blocks_the_approach_and_is_named(scene, s
         if again.reason[h, g] != REACHED:
             continue
         here = ReachedPairs(found.pair[n : n + 1], *(a[h, g : g + 1].copy() for a in again))
-        problem = build_problem(more, GRID)
-        score_approaches(problem, lines(more), here)
+        problem = build_problem(more)
+        score_approaches(problem, lines(more), grid_rows(GRID), here)
         assert here.reason[0] == APPROACH_BLOCKED
         bodies = problem.environment_bodies + problem.robot_bodies
         assert divmod(int(here.contact[0]), bodies) == (5, body)
@@ -121,11 +122,11 @@ def test_an_obstacle_on_the_line_alone_blocks_the_approach_and_is_named(scene, s
 
 
 def test_scores_of_a_pair_do_not_depend_on_the_pairs_before(scene, scores, found):
-    problem = build_problem(scene, GRID)
+    problem = build_problem(scene)
     for n in np.flatnonzero(found.reason != APPROACH_LIMITS)[-12:]:
         h, g = map(int, found.pair[n])
         here = ReachedPairs(found.pair[n : n + 1], *(a[h, g : g + 1].copy() for a in scores))
-        score_approaches(problem, lines(scene), here)
+        score_approaches(problem, lines(scene), grid_rows(GRID), here)
         for alone, among in zip(here, found, strict=True):
             np.testing.assert_array_equal(alone, among[n : n + 1])
 
@@ -149,7 +150,7 @@ def test_limits_end_approaches(scene, scores, found):
     lower[3], upper[3] = elbow - 1e-3, elbow + 1e-3
     stiff = scene._replace(chain=chain._replace(lower=lower, upper=upper))
     here = ReachedPairs(*(array[n : n + 1].copy() for array in found))
-    score_approaches(build_problem(stiff, GRID), lines(stiff), here)
+    score_approaches(build_problem(stiff), lines(stiff), grid_rows(GRID), here)
     assert here.reason[0] == APPROACH_LIMITS
     assert here.contact[0] == NO_CONTACT
 
@@ -158,7 +159,8 @@ def test_windows_narrower_than_the_columns_are_found(scene, found):
     count = found_again = 0
     for n in np.flatnonzero(found.reason == REACHED)[:20]:
         h, g = map(int, found.pair[n])
-        spline = approach_spline(build_problem(scene, GRID), lines(scene), h, g, found.joints[n])
+        row = rows_at(GRID, [h])
+        spline = approach_spline(build_problem(scene), lines(scene), row, g, found.joints[n])
         assert spline is not None
         # Limits around a known motion leave few values of the free joint at each level.
         points, chain = spline[0], scene.chain
@@ -168,10 +170,10 @@ def test_windows_narrower_than_the_columns_are_found(scene, found):
         upper[kept] = np.minimum(upper, points.max(axis=0) + SLACK)[kept]
         narrow = scene._replace(chain=chain._replace(lower=lower, upper=upper))
         here = ReachedPairs(*(array[n : n + 1].copy() for array in found))
-        problem = build_problem(narrow, GRID)
-        score_approaches(problem, lines(narrow), here)
+        problem = build_problem(narrow)
+        score_approaches(problem, lines(narrow), grid_rows(GRID), here)
         if here.reason[0] == REACHED:
-            assert approach_spline(problem, lines(narrow), h, g, here.joints[0]) is not None
+            assert approach_spline(problem, lines(narrow), row, g, here.joints[0]) is not None
             found_again += 1
         count += 1
     # The other lines leave the limits between the levels, or another line is found and blocked.

@@ -14,7 +14,7 @@ from tcs.kernel.cache import jit
 from tcs.kernel.problem import Problem, build_problem
 from tests.kernel.arms import drake_arm
 from tests.kernel.shapes import rotation
-from tests.kernel.toy import toy_grid, toy_scene
+from tests.kernel.toy import toy_scene
 
 MOST = 6
 
@@ -49,7 +49,7 @@ def looked_at(problem: Problem, approach: Approach, b: int, order: IntArray, see
 
 @pytest.fixture(scope="module")
 def problem():
-    return build_problem(toy_scene(drake_arm("pr2 left").chain, 3), toy_grid())
+    return build_problem(toy_scene(drake_arm("pr2 left").chain, 3))
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from tcs.kernel.motion.scene import torso_scene
 from tcs.kernel.problem import build_problem
 from tcs.kernel.verification.reference import link_poses
 from tests.kernel.arms import drake_arm
-from tests.kernel.toy import toy_grid, toy_scene
+from tests.kernel.toy import toy_scene
 
 
 def needed_at(problem, torso):
@@ -24,7 +24,7 @@ def needed_at(problem, torso):
 
 def test_pairs_that_touch_at_another_torso_level_are_kept():
     chain = drake_arm("pr2 left").chain
-    problem = build_problem(toy_scene(chain, 0), toy_grid())
+    problem = build_problem(toy_scene(chain, 0))
     body = problem.body_A.copy()
     # At the first level everything around the arm is far away, at the second where link 2 is.
     body[0, :, CENTRE] += 9.0

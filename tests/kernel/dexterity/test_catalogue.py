@@ -20,7 +20,7 @@ from tcs.kernel.problem import build_problem
 from tcs.kernel.verification import reference
 from tests.kernel.arms import drake_arm
 from tests.kernel.shapes import random_joints, rotation, turned_by
-from tests.kernel.toy import toy_grid, toy_scene
+from tests.kernel.toy import toy_scene
 
 LOWER, UPPER = np.linspace(-2.0, -1.0, 7), np.linspace(1.5, 2.5, 7)
 STEP = 1e-6
@@ -57,7 +57,7 @@ def expected(J, q, lower, upper, measure):
 @pytest.mark.parametrize("measure", MEASURES)
 def test_every_measure_is_its_equation_on_drakes_jacobian(scene, lowered, rng, measure):
     chain = lowered.arrays.chain
-    problem = build_problem(lowered.arrays, lowered.grid, measure)
+    problem = build_problem(lowered.arrays, measure)
     for _ in range(20):
         q = random_joints(rng, chain)
         scene.set_arm(q)
@@ -70,7 +70,7 @@ def test_every_measure_is_its_equation_on_drakes_jacobian(scene, lowered, rng, m
 @pytest.mark.parametrize("measure", MEASURES)
 def test_every_measure_is_its_equation_on_drakes_finite_differences(scene, lowered, rng, measure):
     chain = lowered.arrays.chain
-    problem = build_problem(lowered.arrays, lowered.grid, measure)
+    problem = build_problem(lowered.arrays, measure)
     for _ in range(5):
         q = random_joints(rng, chain)
         J = np.empty((6, 7))
@@ -91,7 +91,7 @@ def test_every_measure_is_its_equation_on_drakes_finite_differences(scene, lower
 @pytest.mark.parametrize("measure", MEASURES)
 def test_every_measure_agrees_with_the_reference(lowered, rng, arm, measure):
     chain = lowered.arrays.chain if arm == "pr2" else drake_arm("panda").chain
-    problem = build_problem(toy_scene(chain, 0), toy_grid(), measure)
+    problem = build_problem(toy_scene(chain, 0), measure)
     for _ in range(30):
         q = random_joints(rng, chain)
         J = reference.jacobian(chain, q)
@@ -153,7 +153,7 @@ def test_extreme_eigenvalues_are_those_of_numpy(values, rng):
 
 def test_a_singular_jacobian_has_inverse_condition_zero(lowered, rng):
     chain = lowered.arrays.chain
-    problem = build_problem(lowered.arrays, lowered.grid, "inverse-condition")
+    problem = build_problem(lowered.arrays, "inverse-condition")
     # The root of rounding, 1e-15: singular values come from J J^T.
     assert measure_at(problem, np.zeros(7)) < 1e-7
     assert reference.inverse_condition(reference.jacobian(chain, np.zeros(7))) < 1e-15

@@ -20,6 +20,7 @@ from tcs.kernel.motion.scene import (
     torso_scene,
 )
 from tcs.kernel.problem import build_problem
+from tcs.kernel.rows import rows_at
 from tcs.kernel.verification.reference_motion import least_excess, straight_curve
 from tcs.kernel.verification.reference_pairs import placed_scene
 from tests.kernel.arms import drake_arm
@@ -62,7 +63,7 @@ def many(chain):
 @pytest.fixture(scope="module")
 def plain(many):
     """Return that scene, prepared at one configuration."""
-    return without_idle_pairs(motion_scene(build_problem(many, toy_grid()), HERE))
+    return without_idle_pairs(motion_scene(build_problem(many), rows_at(toy_grid(), [HERE])))
 
 
 def extremes(row):
@@ -132,17 +133,16 @@ def test_postures_and_curves_are_judged_as_without_groups(plain, chain, rng):
 
 
 def test_a_scene_is_placed_at_every_configuration(many, chain, rng):
-    problem = build_problem(many, toy_grid())
-    sizes = (problem.base_x.size, problem.base_y.size, problem.base_yaw.size)
-    size = problem.environment_states * int(np.prod(sizes)) * problem.torso_levels
+    problem = build_problem(many)
+    grid = toy_grid()
     judged = []
-    for torso in range(problem.torso_levels):
+    for torso in range(len(problem.base_R)):
         scene = grouped(torso_scene(problem, torso))
         # Of both states of the environment, far from each other.
-        for h in (torso, size // 2 + 4 * problem.torso_levels + torso):
+        for h in (torso, grid.size // 2 + 4 * grid.torso_levels + torso):
             # Placing again replaces where the environment was.
-            scene = placed(scene, problem, h)
-            work, reference = new_motion_workspace(scene), placed_scene(many, toy_grid(), h, 0)[0]
+            scene = placed(scene, problem, rows_at(grid, [h]))
+            work, reference = new_motion_workspace(scene), placed_scene(many, grid, h, 0)[0]
             for _ in range(12):
                 q = within_limits(rng, chain)
                 touches = least_excess(reference, q) < 0.0
@@ -179,26 +179,26 @@ def test_shapes_of_the_base_are_in_boxes_at_every_torso_level(many, chain, rng):
         arm_vs_body=many.arm_vs_body[:, which],
         body_vs_environment=many.body_vs_environment[which],
     )
-    problem = build_problem(scene, toy_grid())
+    problem = build_problem(scene)
     lines = approach_scene(problem)
     arm = len(lines.motion.links)
     shift = arm + problem.environment_body.size
     first = shift + len(problem.body_body)
     assert first < arm + len(lines.motion.fixed)
-    assert problem.torso_levels > 1
+    assert len(problem.base_R) > 1
     for n in range(first, arm + len(lines.motion.fixed)):
         members = [i - shift for i in shapes_in(lines.motion, n)]
         assert members
-        for torso in range(problem.torso_levels):
+        for torso in range(len(problem.base_R)):
             still = lines.motion.fixed[n - arm]
             box = np.concatenate([lines.moved[torso, lines.moving == n], still[None]])[0]
             for row in problem.body_A[torso, members]:
                 beyond = (extremes(row) - box[CENTRE : CENTRE + 3]) @ box[ROTATION:].reshape(3, 3)
                 assert np.all(np.abs(beyond) <= box[SIZE : SIZE + 3])
-    for torso in range(problem.torso_levels):
-        plain = torso_scene(problem, torso)
-        of_base = placed(grouped(plain, carriers(problem)), problem, torso)
-        plain = placed(plain, problem, torso)
+    for torso in range(len(problem.base_R)):
+        plain, at = torso_scene(problem, torso), rows_at(toy_grid(), [torso])
+        of_base = placed(grouped(plain, carriers(problem)), problem, at)
+        plain = placed(plain, problem, at)
         works = new_motion_workspace(of_base), new_motion_workspace(plain)
         for _ in range(40):
             q = within_limits(rng, chain)
@@ -210,13 +210,13 @@ def test_shapes_of_the_base_are_in_boxes_at_every_torso_level(many, chain, rng):
 
 
 def test_an_arm_of_few_shapes_is_left_as_it_is(chain):
-    scene = motion_scene(build_problem(toy_scene(chain, 0), toy_grid()), HERE)
+    scene = motion_scene(build_problem(toy_scene(chain, 0)), rows_at(toy_grid(), [HERE]))
     assert grouped(scene) is scene
 
 
 def test_the_motion_of_shapes_in_boxes_is_bounded(many, chain, rng):
     """Of all links before their own, as pairs of two links need it."""
-    scene = grouped(motion_scene(build_problem(many, toy_grid()), HERE))
+    scene = grouped(motion_scene(build_problem(many), rows_at(toy_grid(), [HERE])))
     assert np.count_nonzero(scene.root != np.arange(len(scene.root))) > 50
     work, closer = new_motion_workspace(scene), []
     for _ in range(30):

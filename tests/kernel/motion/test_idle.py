@@ -11,6 +11,7 @@ from tcs.kernel.motion.edges import NO_PAIR, posture_contact
 from tcs.kernel.motion.idle import MOST_BETWEEN, needed_pairs
 from tcs.kernel.motion.scene import motion_scene, new_motion_workspace, with_pairs
 from tcs.kernel.problem import build_problem
+from tcs.kernel.rows import rows_at
 from tcs.kernel.verification.clutter import arm_base
 from tcs.kernel.verification.reference import link_poses
 from tests.kernel.arms import drake_arm
@@ -43,7 +44,7 @@ def with_shapes(chain, frame, body, places):
     for R_AL, p_AL in link_poses(chain, MET)[:3]:
         ball = placed(SPHERE, [0.05, 0, 0], p=R_WA @ (R_AL @ OUT + p_AL) + p_WA)
         scene = with_obstacle(scene, ball)
-    return motion_scene(build_problem(scene, toy_grid()), HERE)
+    return motion_scene(build_problem(scene), rows_at(toy_grid(), [HERE]))
 
 
 @pytest.fixture(scope="module")

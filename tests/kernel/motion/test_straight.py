@@ -120,7 +120,7 @@ def test_joint_limits_and_velocity_limits_end_a_line(chain):
 @pytest.mark.parametrize("name", ["pr2 left", "panda", "baxter"])
 def test_postures_hold_the_tool_at_the_pose(name, rng):
     chain = drake_arm(name).chain
-    problem = build_problem(bare(chain), toy_grid())
+    problem = build_problem(bare(chain))
     q = within_limits(rng, chain)
     R, p = link_poses(chain, q)[-1]
     found = postures_at(problem, R, p, 64)
@@ -133,5 +133,5 @@ def test_postures_hold_the_tool_at_the_pose(name, rng):
 
 
 def test_out_of_reach_there_is_no_posture(chain):
-    problem = build_problem(bare(chain), toy_grid())
+    problem = build_problem(bare(chain))
     assert len(postures_at(problem, np.eye(3), np.array([5.0, 0.0, 0.0]), 64)) == 0

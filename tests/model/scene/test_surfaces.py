@@ -12,6 +12,7 @@ from tcs.kernel.motion.edges import NO_PAIR
 from tcs.kernel.motion.edges import posture_contact as motion_contact
 from tcs.kernel.motion.scene import motion_scene, new_motion_workspace
 from tcs.kernel.problem import build_problem
+from tcs.kernel.rows import rows_at
 from tcs.kernel.verification.constructed import with_goals
 from tcs.kernel.verification.free_postures import posture_contact
 from tcs.kernel.workspace import new_workspace
@@ -104,14 +105,15 @@ def test_kernel_and_planner_agree_with_drake(specs, postures, shaving, full_grid
     lowered = lower(scene, shaving, one)
     q = np.zeros((len(postures[0]), 7))
     q[:, 7 - postures[0].shape[1] :] = postures[0]
-    problem = build_problem(with_goals(lowered.arrays, lowered.grid, 0, q), lowered.grid)
-    motion = motion_scene(problem, 0)
+    problem = build_problem(with_goals(lowered.arrays, lowered.grid, 0, q))
+    row = rows_at(lowered.grid, [0])
+    motion = motion_scene(problem, row)
     work, motion_work = new_workspace(problem), new_motion_workspace(motion)
     scene.place_base(where["base_x"], where["base_y"], np.deg2rad(where["base_yaw"]))
     found = []
     for g, posture in enumerate(q):
         scene.set_arm(posture)
-        free = posture_contact(problem, work, 0, g, posture) == NO_CONTACT
+        free = posture_contact(problem, work, row, g, posture) == NO_CONTACT
         planned = motion_contact(motion, motion_work, posture) == NO_PAIR
         found.append((free, planned, not scene.violations()))
     kernel, planner, drake = np.array(found).T

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from tcs.kernel.arrays import GridArrays
 from tcs.kernel.problem import build_problem
 from tcs.placement.population.problems import PersonProblems
 from tcs.placement.scoring import load_job
@@ -17,9 +16,7 @@ def test_the_problem_of_the_papers_man_is_that_of_the_scene(robot, tmp_path):
     # Paddings by which the shapes of the arm can be told apart.
     pad = np.linspace(0.0, 0.01, len(arrays.arm.pad))
     arrays = arrays._replace(arm=arrays.arm._replace(pad=pad))
-    origin = np.zeros(1)
-    grid = GridArrays(len(arrays.goal_p), origin, origin, origin, len(arrays.arm_base_p))
-    expected = build_problem(arrays, grid)
+    expected = build_problem(arrays)
     found = PersonProblems(arrays, "isotropy").of(arrays)
     for name in ("gap_environment", "gap_base", "environment", "goal_R", "goal_p", "links"):
         np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), name)

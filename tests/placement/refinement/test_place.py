@@ -75,11 +75,11 @@ def test_a_finer_grid_is_tried_where_the_first_does_not_suffice(monkeypatch):
 def test_base_poses_far_from_each_other_are_tried_where_the_best_have_no_path(monkeypatch):
     tried = []
 
-    def blocked_near_the_best(problem, through=None):
-        base = np.array([problem.base_x[0], problem.base_y[0]])
+    def blocked_near_the_best(problem, row, through=None):
+        base = np.array([row.x[0], row.y[0]])
         tried.append(base)
         is_far = np.linalg.norm(base - tried[0]) > 0.25
-        return joint_path.joint_path(problem, through) if is_far else None
+        return joint_path.joint_path(problem, row, through) if is_far else None
 
     monkeypatch.setattr(base_poses, "joint_path", blocked_near_the_best)
     found = tcs.place("iiwa7", line(0.3), region=((0.2, 0.9), (-0.6, 0.6)))

@@ -9,6 +9,7 @@ import pytest
 
 import tcs
 from tcs.kernel.approach.sweep import approach_spline
+from tcs.kernel.rows import grid_rows
 from tcs.motion import check_approaches
 from tcs.motion.approach_check import ApproachScene
 from tcs.placement.refinement import PointScorer, evaluate_refined, score_members
@@ -56,9 +57,12 @@ def test_refined_sets_reach_what_they_can_approach(refined):
     assert table.reached.any()
     for row, member in np.argwhere(table.reached.any(axis=2)):
         there = scene.at(table.values[row, member], {})
+        single = grid_rows(there.lowered.grid)
         for g in np.flatnonzero(table.reached[row, member]).tolist():
             q = table.arm_joints[row, member, g].astype(float)
-            assert approach_spline(there.problem, there.lines, 0, g, q, there.around) is not None
+            assert (
+                approach_spline(there.problem, there.lines, single, g, q, there.around) is not None
+            )
     found = check_approaches(refined, pairs=1)
     assert (found.checked, found.refined_checked, found.false) == (2, 1, 0)
 
@@ -116,8 +120,8 @@ def test_the_base_is_where_it_is_at_the_torso_height(scored, monkeypatch):
     of_levels, placed = trials.arms[0].approaches.scene.moved, []
     assert np.ptp(of_levels, axis=0).any()
 
-    def noted(problem, lines, pairs, memory):
-        placed.append(memory.moved)
+    def noted(problem, lines, rows, pairs, memory):
+        placed.append(memory.moved[rows.torso])
 
     monkeypatch.setattr("tcs.kernel.approach.sweep.score_approaches", noted)
     members = [int(h) for h in scored.nominal.sets.candidates[:6]]

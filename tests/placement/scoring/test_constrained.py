@@ -18,7 +18,6 @@ from tcs.placement.constraints import (
     scored_constraints,
 )
 from tcs.placement.scoring import rebuild_scene, sweep
-from tcs.placement.scoring.engines.work import SHORT_GAP, _scored_runs
 from tcs.placement.tables import Reason
 from tcs.placement.tables.place_map import PlaceMap
 from tests.placement.tables.small import small_grid
@@ -92,28 +91,20 @@ def test_explanation_names_the_constraint(forbidden):
 
 def test_the_kernel_scores_no_more_than_needed(forbidden, small_job, monkeypatch):
     calls = []
-    module = __import__("tcs.placement.scoring.engines.work", fromlist=["score_slice"])
-    real = module.score_slice
+    module = __import__("tcs.placement.scoring.engines.work", fromlist=["score_rows"])
+    real = module.score_rows
 
-    def counted(problem, grippers, start, stop, scores):
-        calls.append(stop - start)
-        real(problem, grippers, start, stop, scores)
+    def counted(problem, grippers, rows, scores):
+        calls.append(len(rows.state))
+        real(problem, grippers, rows, scores)
 
-    monkeypatch.setattr(module, "score_slice", counted)
+    monkeypatch.setattr(module, "score_rows", counted)
     scene = small_job.scene()
     out = np.zeros(small_job.grid.size, dtype=np.bool_)
     out[: small_job.grid.size // 2] = True
     found = sweep(small_job.lowered(scene), small_job.task.weights, excluded=out, jobs=1)
     assert sum(calls) == np.count_nonzero(~out)
     assert np.all(found.tables[0].reason[out] == Reason.EXCLUDED)
-
-
-def test_runs_cover_what_is_scored_and_leave_out_long_gaps():
-    excluded = np.zeros(400, dtype=np.bool_)
-    excluded[10 : 10 + SHORT_GAP // 2] = True
-    excluded[100:300] = True
-    assert _scored_runs(excluded) == [(0, 100), (300, 400)]
-    assert _scored_runs(np.ones(5, dtype=np.bool_)) == []
 
 
 def test_a_box_is_an_obstacle_of_the_environment(blocked, small_environment, tmp_path):

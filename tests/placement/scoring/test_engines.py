@@ -39,8 +39,8 @@ def plain(lowered, small_job, excluded):
 
 @pytest.fixture(scope="module")
 def work(lowered, excluded):
-    problem = build_problem(lowered.arrays, lowered.grid)
-    return Work(problem, gripper_contacts(problem), excluded)
+    problem = build_problem(lowered.arrays)
+    return Work(problem, lowered.grid, gripper_contacts(problem), excluded)
 
 
 @pytest.fixture(scope="module")

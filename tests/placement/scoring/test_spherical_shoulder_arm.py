@@ -74,7 +74,7 @@ def test_the_arm_is_solved_in_reverse(files):
     robot, environment = files
     job = load_job("feeding", environment, robot)
     lowered = job.lowered(job.scene())
-    assert build_problem(lowered.arrays, lowered.grid).arm.free == LAST
+    assert build_problem(lowered.arrays).arm.free == LAST
 
 
 def test_drake_confirms_what_is_scored_and_the_dense_scan_finds_little_more(files):

@@ -16,22 +16,18 @@ from numpy.typing import NDArray
 
 from tcs.errors import TcsError
 from tcs.kernel import cache
+from tcs.kernel.arrays import GridArrays
 from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.problem import Problem
-from tcs.kernel.scores import Scores
-from tcs.kernel.sweep import score_slice
+from tcs.kernel.rows import grid_rows
+from tcs.kernel.scores import Scores, new_scores
+from tcs.kernel.sweep import score_rows
 from tcs.placement.scoring.blocks import Block
 from tcs.placement.tables import Reason
 
 SLICE = 1024
 """Configurations per call of the kernel: some milliseconds of work, with scratch memory that stays
 in the processor's cache."""
-
-JOINTS = 7
-"""Joint angles of a posture."""
-
-SHORT_GAP = 32
-"""Excluded configurations in a row that are scored after all: preparing a run takes longer."""
 
 
 class Part(NamedTuple):
@@ -45,7 +41,9 @@ class Work(NamedTuple):
     """A grid to score."""
 
     problem: Problem
-    """The scene, its goals and its grid."""
+    """The scene and its goals."""
+    grid: GridArrays
+    """The configurations."""
     grippers: NDArray[np.int64]
     """Contacts of the gripper at the goals, from `tcs.kernel.sweep.gripper_contacts`."""
     excluded: NDArray[np.bool_] | None = None
@@ -54,46 +52,27 @@ class Work(NamedTuple):
     def score(self, part: Part) -> Block:
         """Return the scores of a part."""
         slices = [
-            self._score_slice(begin, min(begin + SLICE, part.stop))
+            self._score_rows(begin, min(begin + SLICE, part.stop))
             for begin in range(part.start, part.stop, SLICE)
         ]
         reason, contact, dexterity, joints = map(np.concatenate, zip(*slices, strict=True))
         # Only reached pairs, about one in ten, have joints to keep.
         return Block(reason, contact, dexterity, joints[reason == Reason.REACHED])
 
-    def warm_up(self) -> None:
-        """Compile the kernel, or load its machine code."""
-        self._score_slice(0, 0)
-
-    def _score_slice(self, start: int, stop: int) -> Scores:
+    def _score_rows(self, start: int, stop: int) -> Scores:
         """Return the scores of configurations start <= h < stop."""
-        shape = (stop - start, self.problem.goal_p.shape[1])
-        scores = Scores(
-            reason=np.empty(shape, np.uint8),
-            contact=np.empty(shape, np.int32),
-            dexterity=np.zeros(shape, np.float32),
-            joints=np.zeros((*shape, JOINTS), np.float32),
-        )
+        rows = grid_rows(self.grid, start, stop)
+        goals = self.problem.goal_p.shape[1]
         if self.excluded is None:
-            score_slice(self.problem, self.grippers, start, stop, scores)
+            scores = new_scores(stop - start, goals)
+            score_rows(self.problem, self.grippers, rows, scores)
             return scores
         out = self.excluded[start:stop]
-        for begin, end in _scored_runs(out):
-            rows = slice(begin, end)
-            score_slice(
-                self.problem,
-                self.grippers,
-                start + begin,
-                start + end,
-                Scores(
-                    scores.reason[rows],
-                    scores.contact[rows],
-                    scores.dexterity[rows],
-                    scores.joints[rows],
-                ),
-            )
+        scores = new_scores(stop - start, goals)
         scores.reason[out], scores.contact[out] = Reason.EXCLUDED, NO_CONTACT
-        scores.dexterity[out] = 0.0
+        kept = new_scores(int(np.count_nonzero(~out)), goals)
+        score_rows(self.problem, self.grippers, rows.at(~out), kept)
+        scores.put(~out, kept)
         return scores
 
 
@@ -186,14 +165,3 @@ def _unpacked(packed: PackedWork) -> Work:
 @lru_cache(maxsize=1)
 def _kernel_digest() -> str:
     return cache.kernel_digest(Path(cache.__file__).parent)
-
-
-def _scored_runs(excluded: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return begin and end of the runs to score: all that is not excluded, and short gaps.
-
-    >>> _scored_runs(np.array([True, False, False, True, False]))
-    [(1, 5)]
-    """
-    rows = np.flatnonzero(~excluded)
-    parts = np.split(rows, np.flatnonzero(np.diff(rows) > SHORT_GAP) + 1)
-    return [(int(part[0]), int(part[-1]) + 1) for part in parts if part.size]
