@@ -75,6 +75,10 @@ class Bounds:
         A tour drives to the nearest of its cells, and from there through the others. It is computed
         by other operations than `groups`, and may be less by the rounding.
         """
+        return np.asarray(self.from_cells() - self.travel * self.legs.here_to_cell)
+
+    def from_cells(self) -> FloatArray:
+        """Return the same without the drive to each cell, shape (N,)."""
         legs, index = self.legs, self.index
         per_metre = self.travel * legs.metre
         weights = (float(self.weights.reachability), float(self.weights.manipulability))
@@ -82,8 +86,7 @@ class Bounds:
             (*weights, per_metre, type(legs.distances)),
             lambda: self._gain(*index.group_scores) - per_metre * index.path(legs.distances),
         )
-        from_cell = np.where(legs.reachable, most, -np.inf)
-        return np.asarray(from_cell - self.travel * legs.here_to_cell)
+        return np.where(legs.reachable, most, -np.inf)
 
     def of_member(self, group: IntArray, member: IntArray) -> FloatArray:
         """Return bounds on the sets of a group that contain a candidate, shape (n,)."""
