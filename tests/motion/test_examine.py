@@ -50,7 +50,7 @@ def test_the_command_writes_beside_the_file_and_select_counts_only_what_can_be_d
     assert found["by_postures"]["reachability_done"] == 0.5
     assert found["costs"]["reachability"] == 0.5
     text = run("select", two_goals, "--here", 0.6, -0.9, 45, "--executable").stdout
-    assert "goals with motions: 0" in text
+    assert "goals with motions: 1" in text
     assert "1 of 2 reached pairs can be done" in run("motions", two_goals, "--jobs", 1).stdout
 
 
