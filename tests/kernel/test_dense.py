@@ -7,7 +7,7 @@ import pytest
 
 from tcs.kernel.analytic.solver import outside_solver
 from tcs.kernel.problem import build_problem
-from tcs.kernel.rows import rows_at
+from tcs.kernel.rows import grid_rows, rows_at
 from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED
 from tcs.kernel.verification import dense, reference_pairs
 from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan, dense_scans
@@ -79,7 +79,7 @@ def test_pairs_are_scanned_together_as_alone(lowered, rng, outside):
     pairs = rng.permutation(np.concatenate(chosen))
     assert len(pairs) > 2
     joints, alone = np.full((len(pairs), 7), np.nan), np.full((len(pairs), 7), np.nan)
-    values = dense_scans(problem, pairs, DENSE_SAMPLES, joints)
+    values = dense_scans(problem, grid_rows(grid), pairs, DENSE_SAMPLES, joints)
     for (h, g), value, q in zip(pairs, values, alone, strict=True):
         assert dense_scan(problem, rows_at(grid, [h]), g, DENSE_SAMPLES, q) == value
     assert np.any(values >= 0.0)

@@ -261,7 +261,7 @@ def test_a_wider_freedom_reaches_no_less(name, joints):
         reached = scores_of(scene, toy_grid(states=1)).reason == REACHED
         assert np.all(reached | ~before)
         before = reached
-    assert 5 < np.sum(before) < before.size
+    assert 1 < np.sum(before) < before.size
 
 
 def test_a_nominal_goal_beside_a_free_one_keeps_its_score():

@@ -176,15 +176,15 @@ def draft_robot(
         robot = robot.model_copy(update={"rest": rest or {}})
         robot, axes = with_goal_axes(robot)
         place, doubtful = tool_place(robot), doubts(robot)
-        surfaces = carried_surfaces(robot)
-        found = _blocked(robot, surfaces, steps)
+        carried = carried_surfaces(robot)
+        found = _blocked(robot, carried, steps)
         if not options.coarse and max(by.fraction for by in found) > _ALLOWED:
             splits = _to_tighten(model, primitives, found)
             primitives = tightened(robot, primitives, splits, jobs=options.jobs)
             write_primitives(shapes, primitives)
             steps.repeat(len(found))
             # Others than those that chose the bodies.
-            found = _blocked(robot, surfaces, steps, seed=1)
+            found = _blocked(robot, carried, steps, seed=1)
         blocked, at_boxes = found
     worst = max(fits, key=lambda found: found.fit.excess)
     remarks = [

@@ -25,8 +25,8 @@ def marks(*reached):
 @pytest.mark.parametrize(
     ("reached", "drawn"),
     [
-        ((True, True, False), {"0 1": REACHED, "2": UNREACHED}),
-        ((True, False, False), {"0": REACHED, "1": UNREACHED, "2": UNREACHED}),
+        ((True, True, False), {"1 2": REACHED, "3": UNREACHED}),
+        ((True, False, False), {"1": REACHED, "2": UNREACHED, "3": UNREACHED}),
     ],
     ids=["alike and close", "close but not alike"],
 )
@@ -39,8 +39,8 @@ def test_goals_share_a_mark_where_they_are_close_and_alike(reached, drawn):
 
 def test_the_legend_names_reached_and_unreached_goals():
     assert [handle.get_label() for handle in goal_handles(marks(True, False, True))] == [
-        "reached: chin (0), right cheek (2)",
-        "not reached: left cheek (1)",
+        "reached: chin (1), right cheek (3)",
+        "not reached: left cheek (2)",
     ]
     assert goal_handles([]) == []
 

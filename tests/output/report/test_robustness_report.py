@@ -61,9 +61,9 @@ def test_a_short_row_is_explained_from_its_losses(page, study):
     text = as_markdown(page)
     worst = study.losses.goals[0]
     assert "Below the paper: shaving, small-wheelchair. Goal " in text
-    assert f"Goal {worst.goal} (head) is reached in {100.0 * worst.success:.1f} %" in text
+    assert f"Goal {worst.goal + 1} (head) is reached in {100.0 * worst.success:.1f} %" in text
     table = losses_table(study)
-    assert column(table, "Goal") == [str(loss.goal) for loss in study.losses.goals]
+    assert column(table, "Goal") == [str(loss.goal + 1) for loss in study.losses.goals]
     assert [float(cell) / 100.0 for cell in column(table, "Reached")] == pytest.approx(
         [loss.success for loss in study.losses.goals], abs=0.0005001
     )

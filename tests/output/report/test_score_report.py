@@ -103,7 +103,7 @@ def test_each_goal_is_reported_as_the_file_has_it(report, score_path):
 def test_joints_and_stops_are_those_of_the_file(report):
     scores = report.scored.scores
     for row in joints_table(report).texts():
-        goal, stop = int(row[0]), int(row[1]) - 1
+        goal, stop = int(row[0]) - 1, int(row[1]) - 1
         expected = np.degrees(scores.joints_of(report.shown.indices[stop], goal))
         np.testing.assert_allclose([float(cell) for cell in row[2:]], expected, atol=0.0051)
     table = stops_table(report)
@@ -113,7 +113,7 @@ def test_joints_and_stops_are_those_of_the_file(report):
         assert float(column(table, "heading [deg]")[number]) == pytest.approx(heading, abs=0.5)
     listed = ", ".join(column(table, "Serves goals")).split(", ")
     reached = [g for g, at in enumerate(report.assignment) if at is not None]
-    assert sorted(listed) == sorted(f"{report.goal_names[g]} ({g})" for g in reached)
+    assert sorted(listed) == sorted(f"{report.goal_names[g]} ({g + 1})" for g in reached)
 
 
 def test_every_configuration_counts_once_for_each_goal(report):

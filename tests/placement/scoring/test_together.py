@@ -108,7 +108,7 @@ def test_answers_tell_the_pair(pair):
     members = tuple(pair.configurations.configuration(i) for i in best)
     shown = ShownSet(None, members, best, 0, "", pair)
     caption = scene_figure(pair, shown).axes[0].get_title()
-    assert "arms at goals hold [left arm] (0), wipe [right arm] (1)" in " ".join(caption.split())
+    assert "arms at goals hold [left arm] (1), wipe [right arm] (2)" in " ".join(caption.split())
 
 
 BAD = [

@@ -10,7 +10,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from tcs.errors import RobotError, UnknownNameError
 from tcs.files.quantities import ANGLE, ENTRIES, EXTENT, JOINT_LIMIT, MESH_SCALE, POSITION
@@ -130,6 +129,9 @@ def _is_locked(joint: Joint) -> bool:
 
 def _fixed_at(joint: Joint, position: float) -> Joint:
     """Return a joint that is fixed at a position [rad or m]."""
+    # Imported here: most models need no rotation, and this takes as long as reading them.
+    from scipy.spatial.transform import Rotation
+
     xyz, rpy = joint.xyz, joint.rpy
     if position:
         R = Rotation.from_euler("xyz", rpy)
@@ -363,6 +365,9 @@ def _geometries(
 
 def _caps(cylinder: Geometry) -> tuple[Geometry, ...]:
     """Return the spheres that make a cylinder a capsule, whose length is between their centres."""
+    # Imported here: most models need no rotation, and this takes as long as reading them.
+    from scipy.spatial.transform import Rotation
+
     radius, length = cylinder.size
     along = Rotation.from_euler("xyz", cylinder.rpy).as_matrix()[:, 2] * (length / 2)
     ends = np.array(cylinder.xyz) + np.stack([along, -along])
