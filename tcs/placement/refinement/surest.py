@@ -15,7 +15,7 @@ from tcs.placement.refinement.objectives import TIE, Features, ScoreObjective
 from tcs.placement.refinement.search import GAIN, Evaluated, LocalSearch, Scorer, Walk
 from tcs.placement.refinement.space import Space
 from tcs.placement.refinement.staged import StagedSamples, best_pairs
-from tcs.placement.selection.alternatives import Distinct, Placed
+from tcs.placement.selection.alternatives import Distinct, SetPositions
 from tcs.placement.tables import SetTable
 
 MOST_CANDIDATES = 8000
@@ -67,7 +67,7 @@ def surest_pairs(
     while len(chosen) < count and np.any(differs):
         k = int(np.argmax(differs))
         chosen.append((int(pairs[0][k]), int(pairs[1][k])))
-        offered = tuple(Placed.of_candidates(sets, pair) for pair in chosen)
+        offered = tuple(SetPositions.of_candidates(sets, pair) for pair in chosen)
         differs = Distinct(sets, apart, offered).of_sets(pairs)
         differs[k] = False
     return [tuple(int(h) for h in sets.candidates[list(pair)]) for pair in chosen]

@@ -43,7 +43,7 @@ class Top:
             raise SelectionError(f"min_apart is {self.min_apart!r}; must be 0 to 40 m.")
 
 
-class Placed(NamedTuple):
+class SetPositions(NamedTuple):
     """Where a set of m members is; on the grid or off it."""
 
     bases: NDArray[np.float64]
@@ -53,7 +53,7 @@ class Placed(NamedTuple):
     of the configuration that it was refined from."""
 
     @classmethod
-    def of_candidates(cls, sets: SetTable, rows: Sequence[int]) -> Placed:
+    def of_candidates(cls, sets: SetTable, rows: Sequence[int]) -> SetPositions:
         """Return where a set of the grid is, given its candidate numbers."""
         member = list(rows)
         return cls(sets.cell_xy[sets.cell[member]], sets.state[member].astype(np.int64))
@@ -69,7 +69,7 @@ class Distinct:
 
     sets: SetTable
     min_apart: float
-    offered: tuple[Placed, ...]
+    offered: tuple[SetPositions, ...]
 
     def of_sets(self, members: tuple[IntArray, ...]) -> BoolArray:
         """Return which sets are distinct, given their members of shapes (n,), shape (n,)."""
@@ -82,7 +82,7 @@ class Distinct:
             distinct &= _differ([bits[member] for member in members], states, other)
         return distinct
 
-    def admits(self, placed: Placed) -> bool:
+    def admits(self, placed: SetPositions) -> bool:
         """Return whether a set that need not be on the grid is distinct."""
         return all(
             _differ(
@@ -93,7 +93,7 @@ class Distinct:
             for other in self.offered
         )
 
-    def _bits(self, xy: NDArray[np.float64], other: Placed) -> NDArray[np.uint8]:
+    def _bits(self, xy: NDArray[np.float64], other: SetPositions) -> NDArray[np.uint8]:
         """Return from which members of another set positions (n, 2) are apart, shape (n,).
 
         One bit for each member: there are millions of sets, and few positions.
@@ -104,7 +104,7 @@ class Distinct:
 
 
 def _differ(
-    bits: Sequence[NDArray[np.uint8]], states: Sequence[NDArray[Any]], other: Placed
+    bits: Sequence[NDArray[np.uint8]], states: Sequence[NDArray[Any]], other: SetPositions
 ) -> BoolArray:
     """Return which sets differ from another set, shape (n,).
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +14,15 @@ from tcs.errors import SelectionError
 from tcs.model.grid import Grid, InitialConfiguration
 from tcs.placement.constraints import SAME_VALUE, Footprint, Postures
 from tcs.placement.selection.admission import Left
-from tcs.placement.selection.alternatives import Placed
+from tcs.placement.selection.alternatives import SetPositions
 from tcs.placement.selection.index import SetIndex
 from tcs.placement.selection.observed import Match
-from tcs.placement.selection.ranking import Basis
 from tcs.placement.store import ScoreFile, files_of_arms
 from tcs.placement.store.robot_shapes import RobotShapes
 from tcs.placement.tables import RefinedTable, ScoreTable, SetTable, SuccessTable
+
+Basis = Literal["success", "goals", "utility"]
+"""What decides: the success under error; most goals, fewest members, greatest P_M; the utility."""
 
 FloatArray = NDArray[np.float64]
 
@@ -253,10 +255,10 @@ class Choice:
             plain["warnings"] = list(self.warnings)
         return plain
 
-    def placed(self, grid: Grid) -> Placed:
+    def placed(self, grid: Grid) -> SetPositions:
         """Return where the bases are, and the states of the environment; on the grid or off it."""
         bases = np.array([(member.base_x, member.base_y) for member in self.members])
-        return Placed(bases, grid.state_of(np.array(self.indices, dtype=np.int64)))
+        return SetPositions(bases, grid.state_of(np.array(self.indices, dtype=np.int64)))
 
     def compared_with(self, best: Choice) -> dict[str, Any]:
         """Return an alternative as plain containers, with what it trades against the best set.

@@ -7,12 +7,9 @@ and nowhere else.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
 
+from tcs.placement.selection.choice import Basis, Choice
 from tcs.placement.selection.utility import UtilityWeights
-
-if TYPE_CHECKING:
-    from tcs.placement.selection.choice import Choice
 
 _DEFAULT = UtilityWeights()
 _TIE = 1e-6
@@ -30,8 +27,6 @@ _MOST_GOALS = UtilityWeights(reachability=1e6, travel=0.0, places=0.0, environme
 """P_R before P_M: the weight of no goal is as little as a millionth of all."""
 _SAME_REACHABILITY = 6
 """Decimals to which P_R is compared."""
-Basis = Literal["success", "goals", "utility"]
-"""What decides: the success under error; most goals, fewest members, greatest P_M; the utility."""
 
 
 @dataclass(frozen=True, slots=True)
