@@ -10,6 +10,7 @@ immediate, and selecting from a score file loads neither Drake nor a compiler.
 
 from __future__ import annotations
 
+import time
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -76,6 +77,9 @@ __all__ = [
     "summary",
     "verify",
 ]
+
+loaded_at = time.time()
+"""When this process began to import the package [s since 1970]."""
 
 _HOMES = {
     "BlockFolder": ("tcs.files.blocks", "BlockFolder"),

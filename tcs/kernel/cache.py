@@ -1,9 +1,10 @@
 """Compile kernel functions, and cache the machine code in a folder that cannot go stale.
 
 Numba's cache depends only on the source file of the function: after an edit of a module that this
-file imports, it would load outdated machine code. Kernel functions are therefore cached in a folder
-named by a hash of all kernel sources, the versions of numba and Python, and the processor, in files
-that `tcs.kernel.machine_code` checks before they are loaded.
+file imports, it would load outdated machine code. Kernel functions are therefore cached under a
+hash of the sources that decide their code (`tcs.kernel.sources`), in a folder named by a hash of
+the modules that compile, the versions of numba, numpy and Python, and the processor, in files that
+`tcs.kernel.machine_code` checks before they are loaded.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from __future__ import annotations
 import gc
 import hashlib
 import platform
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -28,6 +29,7 @@ from tcs.files.memory import CODE, COMPILING, check_room
 from tcs.files.paths import cache_folder
 from tcs.kernel.inner_code import InnerCache, InnerCompiler, inner_key
 from tcs.kernel.machine_code import CodeCache, private_folder, warn_once
+from tcs.kernel.sources import COMPILER
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -41,28 +43,33 @@ without collections, compiling takes 140 MB more."""
 
 
 def kernel_digest(folder: Path) -> str:
-    """Return a hash of everything that decides the machine code, as 16 hex digits.
+    """Return a hash of everything that decides the machine code of a folder, as 16 hex digits.
 
     Args:
         folder: The folder whose `*.py` files, at any depth, are the kernel's sources.
     """
+    return _digest(folder, folder.rglob("*.py"))
+
+
+def _digest(folder: Path, sources: Iterable[Path]) -> str:
+    """Return a hash of sources in a folder, of versions and of the processor."""
     digest = hashlib.sha256()
-    for source in sorted(folder.rglob("*.py")):
+    for source in sorted(sources):
         name = source.relative_to(folder).as_posix()
         digest.update(name.encode() + b"\0" + source.read_bytes() + b"\0")
     cpu = f"{llvm.get_host_cpu_name()}{llvm.get_host_cpu_features().flatten()}"
-    versions = f"{numba.__version__} {platform.python_version()} {cpu}"
+    versions = f"{numba.__version__} {np.__version__} {platform.python_version()} {cpu}"
     digest.update(versions.encode())
     return digest.hexdigest()[:16]
 
 
 @cache
 def jit_folder() -> Path | None:
-    """Return the folder of the current machine code, or None if there is none to be trusted."""
+    """Return the folder of the machine code, or None if there is none to be trusted."""
+    kernel = Path(__file__).parent
+    compiling = [kernel / f"{name.rpartition('.')[2]}.py" for name in COMPILER]
     try:
-        return private_folder(
-            private_folder(cache_folder() / "jit") / kernel_digest(Path(__file__).parent)
-        )
+        return private_folder(private_folder(cache_folder() / "jit") / _digest(kernel, compiling))
     except OutputError as error:
         warn_once("folder", f"The kernel compiles anew in every run: {error}")
         return None
@@ -142,7 +149,7 @@ class _Entry(CPUDispatcher):
                 process.
         """
         code: object = self._cache  # type: ignore[attr-defined]
-        kept = isinstance(code, CodeCache) and code.has(sig, self.targetctx)
+        kept = isinstance(code, CodeCache) and code.path(sig, self.targetctx).exists()
         while not kept and _to_announce:
             _to_announce.pop()()
         check_room(CODE if kept else COMPILING)

@@ -28,6 +28,7 @@ from numba.core.serialize import dumps
 from tcs.errors import OutputError
 from tcs.files.paths import CACHE_ADVICE
 from tcs.files.writing import make_folder, whole_file
+from tcs.kernel.sources import SOURCES, homes
 
 _log = logging.getLogger(__name__)
 
@@ -68,15 +69,15 @@ def private_folder(folder: Path) -> Path:
 class CodeFiles(IndexDataCacheFile):
     """The files with the machine code of one function, one for each signature.
 
-    A file holds a checksum of all that follows, and then the state of the function's source file,
-    the key (signature, processor, hash of the byte code) and the compiled function. It is written
-    whole or not at all, so that processes may compile the same function at the same time.
+    A file holds a checksum of all that follows, and then the key (signature, processor, hashes of
+    the byte code and of the sources) and the compiled function. It is written whole or not at all,
+    so that processes may compile the same function at the same time.
     """
 
-    def __init__(self, folder: Path, name: str, stamp: object) -> None:
-        """Take the folder, the function's name with module and line, and its source's state."""
-        super().__init__(str(folder), name, stamp)
-        self._folder, self._name, self._stamp = folder, name, stamp
+    def __init__(self, folder: Path, name: str) -> None:
+        """Take the folder and the function's name with module and line."""
+        super().__init__(str(folder), name, None)
+        self._folder, self._name = folder, name
 
     def flush(self) -> None:
         """Remove the files of the function, for every signature."""
@@ -90,6 +91,8 @@ class CodeFiles(IndexDataCacheFile):
 
     def load(self, key: tuple[Any, ...]) -> object | None:
         """Return what was saved for a key, None if there is nothing that may be loaded."""
+        if key[-1] is None:
+            return None
         path = self.path(key)
         try:
             content = checked_content(path)
@@ -98,13 +101,15 @@ class CodeFiles(IndexDataCacheFile):
         except (OSError, DamagedCodeError) as error:
             warn_once("damaged", f"Machine code is compiled again: '{path}': {error}.")
             return None
-        stamp, saved_key, data = pickle.loads(content)
-        # Two keys may have one name, and the source of a function may have been edited.
-        return data if (stamp, saved_key) == (self._stamp, key) else None
+        saved_key, data = pickle.loads(content)
+        # Two keys may have one name.
+        return data if saved_key == key else None
 
     def save(self, key: tuple[Any, ...], data: object) -> None:
         """Write what was compiled for a key; where that fails, later runs compile it again."""
-        content = dumps((self._stamp, key, data))
+        if key[-1] is None:
+            return
+        content = dumps((key, data))
         try:
             # Not flushed to the disk, which takes longer than some functions take to compile: what
             # a power failure damages has another checksum.
@@ -185,14 +190,14 @@ class CodeCache(FunctionCache):
         super().__init__(function)
         name = f"{function.__module__}.{function.__qualname__}-{function.__code__.co_firstlineno}"
         self._cache_path = str(folder)
-        self._files = CodeFiles(
-            folder,
-            re.sub(r"[^\w.-]", "", name) + self._suffix,
-            self._impl.locator.get_source_stamp(),
-        )
+        self._files = CodeFiles(folder, re.sub(r"[^\w.-]", "", name) + self._suffix)
         self._cache_file = self._files
 
-    def has(self, signature: Any, target_context: Any) -> bool:
-        """Return whether there is a file for a signature, be it damaged."""
-        key = self._index_key(signature, target_context.codegen())
-        return self._files.path(key).exists()
+    def path(self, signature: Any, target_context: Any) -> Path:
+        """Return the path of the file for a signature, whether there is one or not."""
+        return self._files.path(self._index_key(signature, target_context.codegen()))
+
+    def _index_key(self, signature: Any, codegen: Any) -> tuple[Any, ...]:
+        """Return numba's key and the digest of the sources; None in its place if it is unknown."""
+        modules = {self._py_func.__module__, *homes(signature)}
+        return *super()._index_key(signature, codegen), SOURCES.digest(modules)

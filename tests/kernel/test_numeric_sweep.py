@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from tcs.kernel.analytic.solver import is_outside
-from tcs.kernel.cache import jit_folder
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import rows_at
 from tcs.kernel.scores import (
@@ -24,6 +23,7 @@ from tcs.kernel.scores import (
     REACHED,
     TOO_FAR,
 )
+from tcs.kernel.sweep import _score_rows
 from tcs.kernel.verification.dense import dense_scan
 from tcs.kernel.verification.reference import isotropy, jacobian
 from tcs.placement.scoring import load_job
@@ -234,12 +234,18 @@ def test_arms_with_a_closed_form_never_call_the_numeric_code():
     assert done.stdout.strip() == "True []"
 
 
+def machine_code(function):
+    """Return the machine code of a function for all types that it was called with."""
+    context = function.targetctx
+    return [function._cache.path(types, context).read_bytes() for types in function.overloads]
+
+
 def test_arms_with_a_closed_form_never_compile_the_numeric_code():
     scene = toy_scene(random_arm(np.random.default_rng(0)), 0)
     for numeric in (False, True):
         scores_of(scene, toy_grid(), numeric=numeric)
     # Machine code names all functions that were compiled into it, and its signature the solver.
-    files = [path.read_bytes() for path in jit_folder().glob("tcs.kernel.sweep._score_rows-*")]
+    files = machine_code(_score_rows)
     analytic = [content for content in files if b"NumericSolver" not in content]
     assert analytic
     for content in files:
@@ -249,7 +255,7 @@ def test_arms_with_a_closed_form_never_compile_the_numeric_code():
 
 def test_goals_that_leave_no_freedom_never_compile_the_search_over_it():
     scores_of(toy_scene(random_arm(np.random.default_rng(0)), 0), toy_grid())
-    files = [path.read_bytes() for path in jit_folder().glob("tcs.kernel.sweep._score_rows-*")]
+    files = machine_code(_score_rows)
     # Those of goals that leave some contain it, if any were scored before.
     assert any(b"10score_free" not in content for content in files)
 
