@@ -4,14 +4,14 @@ Every request is of another state. Selections with the same weights share what d
 the state; with weights drawn for each request they share nothing.
 
 Usage: python benchmarks/service.py FILE [--clients 50] [--requests 200] [--rounds 5] [--pause 0.0]
-    [--save]
+    [--source FOLDER] [--save]
 
 FILE is a score file made by `tcs score`. The server is a process of its own; the clients share this
 process and write HTTP by hand, so that they take little of the processor. With `--pause`, a client
 waits between its requests on average so long [s]; without, it sends the next at once, and the
 latency is then the number of clients divided by the throughput. Every client sends its requests in
 each round; with weights drawn, all rounds together have as many. Measuring begins once the server
-has prepared what its first job needs.
+has prepared what its first job needs. `--source` runs a server of another version of tcs.
 """
 
 from __future__ import annotations
@@ -23,8 +23,13 @@ import os
 import random
 import subprocess
 import sys
+import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 from table import cell, header, parser, row, save, spread
@@ -47,30 +52,64 @@ def main() -> int:
     command_line.add_argument("--rounds", type=int, default=5)
     command_line.add_argument("--pause", type=float, default=0.0)
     command_line.add_argument("--seed", type=int, default=0)
+    command_line.add_argument("--source", type=Path, metavar="FOLDER")
     options = command_line.parse_args()
     header("fastapi", "uvicorn")
-    server = subprocess.Popen(
-        [sys.executable, "-m", "tcs", "serve", str(options.file), "--port", "0"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    assert server.stdout is not None
-    assert server.stderr is not None
-    try:
-        digest = server.stdout.readline().split()[0]
-        port = int(server.stderr.readline().split("127.0.0.1:")[1].split(",")[0])
-        asked = Asked(load_scores(options.file), digest, options.seed)
-        wait_until_idle(server.pid)
-        asyncio.run(measured(port, asked, options, server.pid))
-        failed = server.poll() is not None
-    finally:
-        server.terminate()
-    traces = server.stderr.read().count("Traceback")
-    row("tracebacks of the server, restarts", f"{traces}, {int(failed)}")
-    cell("service", "tracebacks of the server", "measured", str(traces))
+    with served(options.file, options.source) as server:
+        asked = Asked(load_scores(options.file), server.digest, options.seed)
+        asyncio.run(measured(server.port, asked, options, server.pid))
+    row("tracebacks of the server, restarts", f"{server.traces}, {int(server.failed)}")
+    cell("service", "tracebacks of the server", "measured", str(server.traces))
     save(options)
-    return 1 if traces or failed else 0
+    return 1 if server.traces or server.failed else 0
+
+
+@dataclass
+class Served:
+    """A server of a process of its own."""
+
+    digest: str
+    port: int
+    pid: int
+    traces: int = 0
+    failed: bool = False
+
+
+@contextmanager
+def served(file: Path, source: Path | None) -> Iterator[Served]:
+    """Run a server that holds a file, once it has prepared what its first job needs.
+
+    Args:
+        file: The file.
+        source: Folder with the package that serves; None for the one that is installed.
+    """
+    environment = os.environ | ({} if source is None else {"PYTHONPATH": str(source.resolve())})
+    with tempfile.TemporaryFile("w+") as log:
+        server = subprocess.Popen(
+            [sys.executable, "-P", "-m", "tcs", "serve", str(file.resolve()), "--port", "0"],
+            stdout=subprocess.PIPE, stderr=log, text=True, env=environment,
+        )  # fmt: skip
+        try:
+            assert server.stdout is not None
+            digest = server.stdout.readline().split()[0]
+            while "127.0.0.1:" not in (said := said_by(log)):
+                time.sleep(0.1)
+                if server.poll() is not None:
+                    sys.exit(said)
+            found = Served(digest, int(said.split("127.0.0.1:")[1].split(",")[0]), server.pid)
+            wait_until_idle(server.pid)
+            yield found
+            found.failed = server.poll() is not None
+        finally:
+            server.terminate()
+            server.wait()
+        found.traces = said_by(log).count("Traceback")
+
+
+def said_by(log: IO[str]) -> str:
+    """Return what a server has printed so far."""
+    log.seek(0)
+    return log.read()
 
 
 class Asked:

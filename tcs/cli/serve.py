@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import warnings
 import webbrowser
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -331,8 +330,6 @@ def _engine(
     """Yield an engine that holds the files, and name each with its digest."""
     from tcs.service import Engine, Limits
 
-    # Of a job that is cancelled, joblib reports the parts whose results are not used.
-    warnings.filterwarnings("ignore", category=UserWarning, module="joblib")
     with Engine(Limits(threads=jobs)) as engine:
         for path in files or ():
             on_line(f"{engine.open_file(path).file} {path}")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Container, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,10 @@ a real file decompress to three or four; a file made to fill the memory to a tho
 FREE_BYTES = 32 * 1024**2
 """Bytes that any file may decompress to: small files of equal numbers compress without limit."""
 
+_WIDEST = 8
+"""Most bytes of a decoded number."""
+_ENDLESS = 1 << 62
+"""Sum of sizes beyond which it does not matter."""
 _TYPES = ("u1", "u2", "u4", "u8", "f4", "f8")
 
 
@@ -74,41 +78,87 @@ def check_claims(content: object, exempt: Container[str] = ()) -> None:
     Raises:
         StoreFormatError: If they claim more than `FREE_BYTES` and `MAX_RATIO` times the file's.
     """
-    claimed, stored = 0, 0
-    waiting: list[tuple[str, object]] = [("", content)]
-    # A list may contain another one many times over; it is read once.
-    seen: set[int] = set()
-    while waiting:
-        name, value = waiting.pop()
-        if id(value) in seen:
-            continue
-        seen.add(id(value))
-        if isinstance(value, dict):
-            data = value.get("bytes")
-            if isinstance(data, np.ndarray):
-                stored += data.nbytes
-                if name not in exempt:
-                    claimed += _claimed(value)
-                continue
-            waiting.extend((str(key), item) for key, item in value.items())
-        elif isinstance(value, list | tuple):
-            waiting.extend((name, item) for item in value)
+    data: dict[int, int] = {}
+
+    def claimed(name: str, array: Mapping[str, Any]) -> int:
+        data[id(array["bytes"])] = array["bytes"].nbytes
+        elements = 0 if name in exempt else _elements(array)
+        return elements and elements * int(array["type"][1])
+
+    total = _total(content, claimed)
+    stored = sum(data.values())
     most = FREE_BYTES + MAX_RATIO * stored
-    if claimed > most:
+    if total > most:
         raise StoreFormatError(
-            f"claims arrays of {claimed:,} bytes in {stored:,} bytes of the file; at most {most:,} "
+            f"claims arrays of {total:,} bytes in {stored:,} bytes of the file; at most {most:,} "
             "are possible"
         )
 
 
-def _claimed(encoded: Mapping[str, Any]) -> int:
-    """Return the number of bytes that an encoded array claims; 0 if that cannot be read."""
-    element, shape = encoded.get("type"), encoded.get("shape")
-    if element not in _TYPES or not isinstance(shape, list):
+def decoded_bytes(content: object, narrow: Container[str] = ()) -> int:
+    """Return the memory that the arrays of a file take once they are decoded, or less.
+
+    Whole numbers are stored in the smallest type that has room for them, and decoded to others.
+
+    Args:
+        content: The containers of the file.
+        narrow: Names of arrays that take half as much for each number.
+    """
+    return _total(
+        content,
+        lambda name, array: _elements(array) * (_WIDEST // 2 if name in narrow else _WIDEST),
+    )
+
+
+def _total(content: object, size_of: Callable[[str, Mapping[str, Any]], int]) -> int:
+    """Return the sum of the sizes of all arrays in containers, of each as often as it is there.
+
+    A list may contain another one many times over, or itself: each is looked at once.
+    """
+    totals: dict[int, int] = {}
+    begun: set[int] = set()
+    waiting = [content]
+    while waiting:
+        value = waiting[-1]
+        if id(value) in totals:
+            waiting.pop()
+            continue
+        parts = _parts(value)
+        if id(value) not in begun:
+            begun.add(id(value))
+            waiting.extend(one for _, one in parts if id(one) not in begun and not _is_array(one))
+        else:
+            sizes = (
+                size_of(name, one) if _is_array(one) else totals.get(id(one), 0)
+                for name, one in parts
+            )
+            totals[id(value)] = min(sum(sizes), _ENDLESS)
+    return totals[id(content)]
+
+
+def _parts(value: object) -> list[tuple[str, Any]]:
+    """Return the containers in a container, each with the key it is under."""
+    entries: Iterable[tuple[Any, Any]] = ()
+    if isinstance(value, dict):
+        entries = value.items()
+    elif isinstance(value, list | tuple):
+        entries = (("", entry) for entry in value)
+    return [(str(key), entry) for key, entry in entries if isinstance(entry, dict | list | tuple)]
+
+
+def _is_array(value: object) -> TypeGuard[Mapping[str, Any]]:
+    """Return whether containers are those of an array."""
+    return isinstance(value, dict) and isinstance(value.get("bytes"), np.ndarray)
+
+
+def _elements(encoded: Mapping[str, Any]) -> int:
+    """Return the number of elements that an encoded array claims; 0 if that cannot be read."""
+    shape = encoded.get("shape")
+    if encoded.get("type") not in _TYPES or not isinstance(shape, list):
         return 0
-    if not all(type(n) is int and n >= 0 for n in shape):
+    if not all(type(n) is int and 0 <= n <= MAX_BYTES for n in shape):
         return 0
-    return math.prod(shape) * int(element[1])
+    return math.prod(shape)
 
 
 def decompress(

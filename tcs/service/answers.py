@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -136,10 +137,8 @@ _LOADED = 2
 _files: ScoreFiles | None = None
 
 
-def answer_in_process(
-    name: str, request: Any, held: HeldFile, motions: MotionFile | None
-) -> dict[str, Any]:
-    """Return the answer to a request about a file of another process, in this one.
+def answer_in_process(name: str, request: Any, held: HeldFile, motions: MotionFile | None) -> str:
+    """Return the answer to a request about a file of another process, in this one, in JSON.
 
     Args:
         name: Name of the method of `Answers`.
@@ -153,5 +152,4 @@ def answer_in_process(
     _files.lend(held)
     if motions is not None:
         _files.hold_motions(held.entry.file, motions)
-    answer: dict[str, Any] = getattr(Answers(_files), name)(request)
-    return answer
+    return json.dumps(getattr(Answers(_files), name)(request), allow_nan=False)

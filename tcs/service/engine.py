@@ -2,28 +2,21 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
-from tcs.errors import EnvironmentFileError, ServiceError, TcsError
-from tcs.files.documents import Document, checked
-from tcs.files.json_values import without_infinities
+from tcs.errors import ServiceError
+from tcs.files.documents import Document
 from tcs.files.writing import scratch_folder
 from tcs.kernel.dexterity import dexterity
 from tcs.model.catalogue import catalogue, check_names
-from tcs.output.words import goal_index
 from tcs.service.answers import Answers, answer_in_process
-from tcs.service.conversions import (
-    state_of,
-)
-from tcs.service.described import DescribedScenes, work_by_name
-from tcs.service.heavy_imports import drawing_steps, import_heavy, import_scoring
 from tcs.service.jobs import Jobs, Progress
 from tcs.service.limits import Limits
-from tcs.service.postures import ScenePostures
 from tcs.service.preparation import Preparation
 from tcs.service.requests import (
     EvaluateRequest,
@@ -43,12 +36,10 @@ from tcs.service.requests import (
     SelectRequest,
 )
 from tcs.service.responses import FileEntry, JobStatus
+from tcs.service.scene_processes import OfFile, SceneProcess
 from tcs.service.score_files import ScoreFiles
 from tcs.service.sent_content import request_of
-from tcs.service.sent_documents import SentDocuments
-from tcs.service.set_work import SetWork
 from tcs.service.views import Views
-from tcs.service.work import SceneWork
 from tcs.service.worker import WorkerPool
 
 _DEFAULT_LIMITS = Limits()
@@ -90,14 +81,17 @@ class Engine:
         self._stack.callback(self._parsing.close)
         self._files = ScoreFiles(folder, limits, self._parsing)
         self._answers = Answers(self._files)
-        self._sent = SentDocuments(folder, limits.document_bytes)
         self._jobs = Jobs(limits)
         self._views = Views(self._files)
-        self._postures = ScenePostures()
-        self._work = SceneWork(self._files, self._sent, limits)
-        self._jobs_by_name = work_by_name(self._work, SetWork(self._files, limits))
-        self._described = DescribedScenes(self._files, folder, limits)
-        self._stack.callback(self._described.close)
+        ours, sent = folder / "scenes", folder / "described"
+        # Whoever looks at a scene does not wait for the job that scores it.
+        self._scenes = SceneProcess(self._files, ours, limits, memory=None)
+        self._postures = SceneProcess(self._files, ours, limits, memory=limits.scene_bytes)
+        self._described = SceneProcess(
+            self._files, sent, limits, memory=limits.scene_bytes, is_described=True
+        )
+        for process in (self._scenes, self._postures, self._described):
+            self._stack.callback(process.close)
         self._preparation: Preparation | None = None
 
     def __enter__(self) -> Self:
@@ -118,19 +112,28 @@ class Engine:
     def prepare(self, on_end: Callable[[], object] | None = None) -> Preparation:
         """Begin, in a thread, what the first job would wait for, and return it.
 
-        Drake is imported, the kernel's machine code loaded, a scene built, and what draws imported;
-        where there is no machine code yet, it is not compiled. Choosing from files needs none of
-        this, and far less memory.
+        The processes of scenes import Drake, load the kernel's machine code, build a scene, and
+        import what draws; where there is no machine code yet, it is not compiled. Choosing from
+        files needs none of this, and far less memory.
 
         Args:
             on_end: Called by the thread when it is done, or a step has failed.
         """
         if self._preparation is None:
             steps = (
-                self._parsing.start, import_scoring, self._work.prepare, *drawing_steps()
-            )  # fmt: skip
+                self._parsing.start,
+                lambda: self._scenes.prepare(self._first_names()),
+                self._postures.prepare,
+            )
             self._preparation = Preparation(steps, on_end)
         return self._preparation
+
+    def _first_names(self) -> dict[str, str]:
+        """Return task, environment and robot of the likely first job."""
+        for entry in self._files.entries()[:1]:
+            metadata = self._files.loaded(entry.file).metadata
+            return {key: metadata[key] for key in ("task", "environment", "robot")}
+        return {"task": "shaving"}
 
     def request_of(self, model: type[Document], content: bytes) -> Any:
         """Return a checked request, read in a process of its own.
@@ -195,14 +198,9 @@ class Engine:
             NotFoundError: If the score file is not held.
             EnvironmentFileError: If a model of it does not ship with tcs.
         """
-        from tcs.model.scene import EnvironmentFile
-        from tcs.model.scene.changes import environment_text
-
-        with self._files.held(file).lock:
-            content = self._files.loaded(file).environment
-        where = "environment of the score file"
-        environment = checked(content, EnvironmentFile, where, EnvironmentFileError)
-        return environment_text(environment, portable=True)
+        process = self._process_of(file, self._postures)
+        text: str = json.loads(process.do("environment", OfFile(file)))["text"]
+        return text
 
     def view_of(self, file: str) -> bytes:
         """Return a page with the scene in 3-D, as `tcs view --export`; it takes some seconds.
@@ -262,22 +260,24 @@ class Engine:
         """
         return self._answers.outcome(request)
 
-    def answer_apart(self, name: str, request: Any) -> dict[str, Any]:
-        """Return what the method of a name does, from a process of its own.
+    def answer_apart(self, name: str, request: Any) -> str:
+        """Return what the method of a name does, in JSON, from a process of its own.
 
         Large requests take longer: those of others about the same file need not wait for them.
 
         Args:
-            name: "select", "explain", "floor" or "outcome".
+            name: "select", "explain", "floor", "outcome" or "posture".
             request: The request.
 
         Raises:
             ServiceError: If the answer meets a limit.
             TcsError: As the method.
         """
+        if name == "posture":
+            return self._process_of(request.file, self._postures).do(name, request)
         held = self._files.held(request.file)
         motions = self._files.known_motions(request.file)
-        answer: dict[str, Any] = self._parsing.call(
+        answer: str = self._parsing.call(
             answer_in_process, name, request, held, motions,
             seconds=self._limits.parse_seconds, what="the request",
         )  # fmt: skip
@@ -291,13 +291,16 @@ class Engine:
             StoreMismatchError: If the models are not those the file was made from.
             SelectionError: If the base pose is beyond the grid, or there is no such goal.
         """
-        if self._files.held(request.file).is_described:
-            return self._described.do("posture", request)
-        file = self._files.for_scene(request.file)
-        stated = state_of(request.here, request.torso, request.at)
-        import_heavy()
-        goal = None if request.goal is None else goal_index(file, request.goal)
-        return self._postures.at(request.file, file, stated, goal=goal, arm=request.arm)
+        found: dict[str, Any] = json.loads(self.answer_apart("posture", request))
+        return found
+
+    def _process_of(self, file: str, ours: SceneProcess) -> SceneProcess:
+        """Return the process for the scene of a file.
+
+        Raises:
+            NotFoundError: If the score file is not held.
+        """
+        return self._described if self._files.held(file).is_described else ours
 
     def submit(self, request: JobRequest) -> JobStatus:
         """Queue a job, and return its state.
@@ -309,6 +312,14 @@ class Engine:
         """
         what, work = self._work_of(request)
         return self._jobs.submit(what, work)
+
+    def job_text(self, name: str) -> str:
+        """Return the state of a job and its result, in JSON; the result is not read for it.
+
+        Raises:
+            NotFoundError: If there is no such job, or it ended long ago.
+        """
+        return self._jobs.text(name)
 
     def jobs(self) -> list[JobStatus]:
         """Return the states of all jobs without their results, the oldest first."""
@@ -324,6 +335,8 @@ class Engine:
 
     def next_state(self, name: str, known: JobStatus | None, seconds: float) -> JobStatus:
         """Return the state of a job as soon as it differs from a known one, or after a time [s].
+
+        It lacks the result, which `job` returns.
 
         Raises:
             NotFoundError: If there is no such job.
@@ -353,9 +366,9 @@ class Engine:
             if on_progress is not None and status.total:
                 on_progress(status.done, status.total)
             status = self._jobs.wait_for_change(name, status, _POLL)
-        return status
+        return self._jobs.status(name)
 
-    def _work_of(self, request: JobRequest) -> tuple[str, Callable[[Progress], dict[str, Any]]]:
+    def _work_of(self, request: JobRequest) -> tuple[str, Callable[[Progress], str]]:
         """Return what a job does and the function that does it, after quick checks."""
         what = _NAMES[type(request)]
         if isinstance(request, ScoreRequest):
@@ -364,30 +377,7 @@ class Engine:
             check_names(request.task, request.environment, request.robot)
             dexterity(request.measure)
             is_described = request.task_yaml is not None or request.environment_yaml is not None
+            process = self._described if is_described else self._scenes
         else:
-            is_described = self._files.held(request.file).is_described
-        if is_described:
-            return what, partial(self._described.do, what, request)
-        prepared = import_scoring if isinstance(request, ScoreRequest) else import_heavy
-        return what, self._plainly(partial(self._jobs_by_name[what], request), prepared)
-
-    def _plainly(
-        self,
-        work: Callable[[Progress], dict[str, Any]],
-        prepared: Callable[[], None],
-    ) -> Callable[[Progress], dict[str, Any]]:
-        """Return work whose result JSON can hold, and whose messages name no temporary folder.
-
-        Args:
-            work: The work of a job.
-            prepared: Imports what it needs, while no other thread imports the same.
-        """
-
-        def done(progress: Progress) -> dict[str, Any]:
-            try:
-                prepared()
-                return dict(without_infinities(work(progress)))
-            except TcsError as error:
-                raise self._sent.without_folder(error) from None
-
-        return done
+            process = self._process_of(request.file, self._scenes)
+        return what, partial(process.do, what, request)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import secrets
 import threading
@@ -9,7 +10,6 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from tcs.errors import BusyError, CancelledError, NotFoundError, TcsError
 from tcs.service.limits import Limits
@@ -46,8 +46,8 @@ class Progress:
         self._jobs.update(self._job, note="compiling for this machine, up to a minute")
 
 
-Work = Callable[[Progress], dict[str, Any]]
-"""Does the work of a job and returns its result."""
+Work = Callable[[Progress], str]
+"""Does the work of a job and returns its result in JSON."""
 
 
 @dataclass(eq=False)
@@ -63,12 +63,12 @@ class _Job:
     note: str = ""
     begun: float = 0.0
     seconds: float = 0.0
-    result: dict[str, Any] | None = None
+    result: str | None = None
     problem: str | None = None
     is_cancelled: bool = False
 
     def status(self) -> JobStatus:
-        """Return the present state."""
+        """Return the present state without the result."""
         running = self.state == "running"
         return JobStatus(
             job=self.name,
@@ -78,7 +78,6 @@ class _Job:
             total=self.total,
             note=self.note,
             seconds=round(time.monotonic() - self.begun if running else self.seconds, 3),
-            result=self.result,
             problem=self.problem,
         )
 
@@ -122,21 +121,34 @@ class Jobs:
             return job.status()
 
     def status(self, name: str) -> JobStatus:
-        """Return the state of a job.
+        """Return the state of a job with its result.
 
         Raises:
             NotFoundError: If there is no such job, or it ended long ago.
         """
-        with self._changed:
-            return self._job(name).status()
+        status, result = self._state(name)
+        return status.model_copy(update={"result": None if result is None else json.loads(result)})
+
+    def text(self, name: str) -> str:
+        """Return the state of a job with its result, in JSON; the result is not read for it.
+
+        Raises:
+            NotFoundError: If there is no such job, or it ended long ago.
+        """
+        status, result = self._state(name)
+        text = json.dumps(status.model_dump(exclude={"result"}))
+        return f'{text[:-1]}, "result": {result or "null"}}}'
 
     def all(self) -> list[JobStatus]:
         """Return the states of all jobs, without their results, the oldest first."""
         with self._changed:
-            return [job.status().model_copy(update={"result": None}) for job in self._jobs.values()]
+            return [job.status() for job in self._jobs.values()]
 
     def cancel(self, name: str) -> JobStatus:
         """Cancel a job: a waiting one at once, a running one where it next reports its progress.
+
+        Returns:
+            Its state, without the result that it may have.
 
         Raises:
             NotFoundError: If there is no such job.
@@ -150,7 +162,7 @@ class Jobs:
             return job.status()
 
     def wait_for_change(self, name: str, known: JobStatus | None, seconds: float) -> JobStatus:
-        """Return the state of a job as soon as it differs from a known one.
+        """Return the state of a job, without its result, as soon as it differs from a known one.
 
         Args:
             name: The job.
@@ -201,6 +213,12 @@ class Jobs:
                 job.is_cancelled = True
             self._changed.notify_all()
 
+    def _state(self, name: str) -> tuple[JobStatus, str | None]:
+        """Return the state of a job, and its result in JSON."""
+        with self._changed:
+            job = self._job(name)
+            return job.status(), job.result
+
     def _job(self, name: str) -> _Job:
         if name not in self._jobs:
             raise NotFoundError("there is no such job; finished jobs are kept for a while only.")
@@ -241,7 +259,7 @@ class Jobs:
         state: JobState,
         problem: str | None = None,
         *,
-        result: dict[str, Any] | None = None,
+        result: str | None = None,
     ) -> None:
         with self._changed:
             job.result, job.problem = result, problem
@@ -265,5 +283,6 @@ def _outcome_of(error: Exception, job: _Job) -> tuple[JobState, str]:
 
 
 def _differ(first: JobStatus, second: JobStatus) -> bool:
-    """Return whether two states differ in more than their duration."""
-    return first.model_copy(update={"seconds": 0.0}) != second.model_copy(update={"seconds": 0.0})
+    """Return whether two states differ in more than their duration and the result."""
+    only_now = {"seconds": 0.0, "result": None}
+    return first.model_copy(update=only_now) != second.model_copy(update=only_now)

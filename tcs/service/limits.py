@@ -37,6 +37,9 @@ class Limits:
     """Longest time in which a large request or a score file that was sent is read [s]."""
     parse_bytes: int = 1024**3
     """Most memory that reading it takes."""
+    decoded_bytes: int = 256 * 1024**2
+    """Most memory of the arrays of a score file that was sent; reading takes up to four times as
+    much for a moment, also where requests are answered."""
     parsing: int = 2
     """Processes that read."""
     scene_bytes: int = 4 * 1024**3

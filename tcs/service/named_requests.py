@@ -111,7 +111,7 @@ class NamedRequests:
         status, end = self._engine.submit(request), time.monotonic() + self._job_seconds
         while not status.has_ended and (left := end - time.monotonic()) > 0.0:
             status = self._engine.next_state(status.job, status, left)
-        return status.model_dump()
+        return self._engine.job(status.job).model_dump()
 
 
 def named_problem(error: TcsError) -> dict[str, str]:

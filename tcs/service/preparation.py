@@ -37,7 +37,7 @@ class Preparation:
                 return
             try:
                 step()
-            except (TcsError, ImportError, MemoryError, OSError) as error:
+            except (TcsError, RuntimeError, ImportError, MemoryError, OSError) as error:
                 _LOG.info("not prepared: %s", error)
                 break
         if self._on_end is not None and not self._stopped.is_set():

@@ -43,7 +43,7 @@ class HeldFile:
     number: int
     """Number of the file, in the order in which they came."""
     is_described: bool
-    """Whether its scene is one that a client described, which is built in a process of its own."""
+    """Whether its scene is one that a client described, for which there is another process."""
     lock: threading.RLock = field(default_factory=threading.RLock)
     """Held while the file is read: what selection derives from it is kept in it."""
 
@@ -161,8 +161,9 @@ class ScoreFiles:
             self._remember(digest, file)
             return entry_of(file, digest, path.stat().st_size)
         entry: FileEntry = self._parsing.call(
-            entry_of_file, path, digest, seconds=self._limits.parse_seconds, what="the score file"
-        )
+            entry_of_file, path, digest, self._limits.decoded_bytes,
+            seconds=self._limits.parse_seconds, what="the score file",
+        )  # fmt: skip
         return entry
 
     def add_made(self, file: ScoreFile) -> HeldFile:
@@ -174,7 +175,8 @@ class ScoreFiles:
         with scratch_folder() as folder:
             path = folder / "made.tcs"
             save_scores(path, file)
-            return self.add(path.read_bytes(), is_ours=True)
+            digest = hashlib.sha256(path.read_bytes()).hexdigest()
+            return self.adopt(path, entry_of(file, digest, path.stat().st_size))
 
     def read(self, path: Path) -> HeldFile:
         """Hold a file that is named when the service starts, until it ends, and its motions.
@@ -221,8 +223,13 @@ class ScoreFiles:
         Raises:
             NotFoundError: If no file of that digest is held.
         """
-        with self._lock:
-            return self.held(digest).path.read_bytes()
+        path = self.held(digest).path
+        try:
+            # It may take long, in which other files are used.
+            return path.read_bytes()
+        except FileNotFoundError:
+            self.held(digest)
+            raise
 
     def loaded(self, digest: str) -> ScoreFile:
         """Return the content of a file.
@@ -231,11 +238,11 @@ class ScoreFiles:
             NotFoundError: If no file of that digest is held.
         """
         with self._lock:
-            path, file = self.held(digest).path, self._loaded.get(digest)
+            held, file = self.held(digest), self._loaded.get(digest)
         if file is None:
             try:
                 # It takes up to seconds, in which other files are used.
-                file = load_scores(path)
+                file = load_scores(held.path, None if held.is_ours else self._limits.decoded_bytes)
             except StoreError:
                 self.held(digest)
                 raise

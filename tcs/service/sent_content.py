@@ -34,13 +34,18 @@ def request_of(model: type[Document], content: bytes) -> Any:
     return checked(fields, model, "request", DataFileError)
 
 
-def entry_of_file(path: Path, digest: str) -> FileEntry:
+def entry_of_file(path: Path, digest: str, most: int) -> FileEntry:
     """Return what a score file is of, after reading it.
 
+    Args:
+        path: The file.
+        digest: Digest of its content.
+        most: Most bytes that its arrays may take once they are decoded.
+
     Raises:
-        StoreError: If it is not a score file.
+        StoreError: If it is not a score file, or takes more memory.
     """
-    file = load_scores(path)
+    file = load_scores(path, most)
     # Scores are decoded when they are needed: here for the first time, where memory is limited.
     for table in file.tables:
         table.read_scores()

@@ -10,7 +10,7 @@ from tcs.service.limits import Limits
 from tcs.service.requests import MotionsRequest, PopulationRequest, RefineRequest
 from tcs.service.score_files import ScoreFiles
 
-# Drake and the compiler are loaded by the first job: choosing from files does without.
+# Drake and the compiler are loaded by the process that does the work.
 
 
 class SetWork:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from tcs.errors import SelectionError, ServiceError
@@ -35,7 +34,7 @@ if TYPE_CHECKING:
     from tcs.placement.scoring import LiveScorer
     from tcs.service.rescoring import Rescorer
 
-# Drake and the compiler are loaded by the first job, or by `prepare`: choosing from files does
+# Drake and the compiler are loaded by the process that does the work: choosing from files does
 # without.
 
 
@@ -47,7 +46,6 @@ class SceneWork:
         self._files, self._sent, self._limits = files, sent, limits
         self._scorer: tuple[str, LiveScorer] | None = None
         """The last live scorer and the request that it is for: building it takes a second."""
-        self._building = threading.Lock()
         self._rescorer: Rescorer | None = None
 
     def score(self, request: ScoreRequest, progress: Progress) -> dict[str, Any]:
@@ -92,18 +90,17 @@ class SceneWork:
         progress(1, 1)
         return {**self._held(scored), "observation": scored.metadata["observation"]}
 
-    def prepare(self) -> None:
-        """Build the live scorer of the first file's task, or of the wheelchair; compile nothing.
+    def prepare(self, names: Mapping[str, str]) -> None:
+        """Build the live scorer of a task; compile nothing.
 
         Any live scorer loads the kernel's machine code; this one serves the likely first request.
+
+        Args:
+            names: Task, environment and robot.
 
         Raises:
             TcsError: As `tcs.LiveScorer`, and if there is no machine code yet.
         """
-        names = {"task": "shaving"}
-        for entry in self._files.entries()[:1]:
-            metadata = self._files.loaded(entry.file).metadata
-            names = {key: metadata[key] for key in ("task", "environment", "robot")}
         if not any(is_path(name) for name in names.values()):
             self._scorer_of(ScoreHereRequest.model_validate(names), _without_compiling)
 
@@ -113,14 +110,13 @@ class SceneWork:
 
         only_now = {"observed": {}, "frames": {}, "every": 1, "around": None}
         key = request.model_copy(update=only_now).model_dump_json()
-        with self._building:
-            if self._scorer is None or self._scorer[0] != key:
-                self._scorer = None
-                scorer = LiveScorer(
-                    *self._models(request), on_compile=on_compile, **self._options(request)
-                )
-                self._scorer = (key, scorer)
-            return self._scorer[1]
+        if self._scorer is None or self._scorer[0] != key:
+            self._scorer = None
+            scorer = LiveScorer(
+                *self._models(request), on_compile=on_compile, **self._options(request)
+            )
+            self._scorer = (key, scorer)
+        return self._scorer[1]
 
     def rescore(self, request: RescoreRequest, progress: Progress) -> dict[str, Any]:
         """Return the summary of the task scored in the changed environment; as `score`.

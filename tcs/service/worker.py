@@ -26,12 +26,15 @@ from typing import Any
 
 import tcs.errors
 import tcs.files.memory
-from tcs.errors import BusyError, ServiceError, TcsError, UnknownNameError
+from tcs.errors import BusyError, CancelledError, ServiceError, TcsError, UnknownNameError
 
 _LOG = logging.getLogger(__name__)
 _LOOK = 0.1
 """Interval at which a caller looks whether its call was cancelled, and a process for the one that
 started it [s]."""
+_GRACE = 2.0
+"""Time in which a call that was cancelled ends by itself, where it next reports; then its process
+is ended, and with it what it keeps from one call to the next [s]."""
 _COMMAND = "import sys; from tcs.service.worker import serve; serve(sys.argv[1:])"
 Report = Callable[[Any], None]
 Look = Callable[[], None]
@@ -40,11 +43,12 @@ Look = Callable[[], None]
 class Worker:
     """A process that calls functions, one at a time; it is started by the first call."""
 
-    def __init__(self, *, memory: int, imports: Sequence[str] = ()) -> None:
+    def __init__(self, *, memory: int | None, imports: Sequence[str] = ()) -> None:
         """Start nothing yet.
 
         Args:
-            memory: Most bytes that calls take beyond what the process takes before the first.
+            memory: Most bytes that calls take beyond what the process takes before the first; None
+                for no limit.
             imports: Modules that it imports before the first call.
         """
         self._memory, self._imports = memory, tuple(imports)
@@ -69,7 +73,7 @@ class Worker:
             seconds: Longest duration [s].
             what: What is parsed or built, for messages.
             on_report: Called with what the function passes to `report`.
-            look: Called now and then; what it raises ends the process.
+            look: Called now and then; what it raises cancels the call.
 
         Raises:
             ServiceError: If a limit is met.
@@ -87,6 +91,8 @@ class Worker:
                 # What runs out of memory in compiled code ends the process.
                 kind, value = "memory", None
                 self.close()
+            except CancelledError:
+                raise
             except BaseException:
                 self.close()
                 raise
@@ -94,6 +100,8 @@ class Worker:
             return value
         if kind == "memory":
             self.close()
+            if self._memory is None:
+                raise ServiceError(f"{what} takes more memory than this machine has left.")
             raise ServiceError(f"{what} takes more memory than {self._memory:,} bytes, the limit.")
         if kind == "defect":
             raise RuntimeError(f"{what} failed in a process of its own:\n{value}")
@@ -114,14 +122,28 @@ class Worker:
         assert connection is not None
         connection.send((function, arguments))
         while True:
-            look()
-            if time.monotonic() > end:
-                raise TimeoutError
-            if connection.poll(_LOOK):
-                kind, value = connection.recv()
-                if kind != "report":
-                    return kind, value
-                on_report(value)
+            try:
+                look()
+                if time.monotonic() > end:
+                    raise TimeoutError
+                if connection.poll(_LOOK):
+                    kind, value = connection.recv()
+                    if kind != "report":
+                        return kind, value
+                    on_report(value)
+            except CancelledError:
+                self._cancel(connection)
+                raise
+
+    def _cancel(self, connection: Connection) -> None:
+        """End the present call where it next reports; if that takes too long, end the process."""
+        end = time.monotonic() + _GRACE
+        with suppress(EOFError, OSError):
+            connection.send(None)
+            while connection.poll(max(end - time.monotonic(), 0.0)):
+                if connection.recv()[0] != "report":
+                    return
+        self.close()
 
     def _start(self) -> None:
         self.close()
@@ -129,8 +151,8 @@ class Worker:
         with theirs:
             # Standard output belongs to the answers of an assistant, and Ctrl-C to this process.
             self._process = subprocess.Popen(
-                [sys.executable, "-P", "-c", _COMMAND, str(theirs.fileno()), str(self._memory),
-                 *self._imports],
+                [sys.executable, "-P", "-c", _COMMAND, str(theirs.fileno()),
+                 str(self._memory or 0), *self._imports],
                 stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, pass_fds=[theirs.fileno()],
                 start_new_session=True, env=os.environ | {"PYTHONPATH": os.pathsep.join(_paths())},
             )  # fmt: skip
@@ -204,9 +226,17 @@ _connection: Connection | None = None
 
 
 def report(value: Any) -> None:
-    """Pass a value to the caller of the present call, in the process that makes it."""
+    """Pass a value to the caller of the present call, in the process that makes it.
+
+    Raises:
+        CancelledError: If the call was cancelled.
+    """
     assert _connection is not None
     _connection.send(("report", value))
+    if _connection.poll():
+        # During a call, nothing else is sent.
+        _connection.recv()
+        raise CancelledError("the call was cancelled.")
 
 
 def serve(arguments: Sequence[str]) -> None:
@@ -217,12 +247,15 @@ def serve(arguments: Sequence[str]) -> None:
     threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
     for name in imports:
         import_module(name)
-    _limit(int(memory))
+    if int(memory):
+        _limit(int(memory))
     _connection = Connection(int(descriptor))
     with suppress(EOFError, OSError):
         while True:
-            function, given = _connection.recv()
-            _connection.send(_outcome(function, given))
+            call = _connection.recv()
+            # A call that had ended may have been cancelled.
+            if call is not None:
+                _connection.send(_outcome(*call))
 
 
 def _outcome(function: Callable[..., Any], given: Sequence[Any]) -> tuple[str, Any]:

@@ -1,4 +1,4 @@
-"""A master of ROS 1 for the tests of the process, where Debian's packages are installed."""
+"""Calls of processes made in this one, and a master of ROS 1 where Debian's packages are."""
 
 from __future__ import annotations
 
@@ -6,12 +6,31 @@ import os
 import socket
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
 
 from tcs.errors import ServiceError
+from tcs.service import scene_processes
 from tcs.service.ros.ros1_types import DEBIAN, ros1_modules
+from tcs.service.worker import Worker
+
+
+@pytest.fixture(scope="module")
+def in_process():
+    """Make the calls of processes in this one, where tests put something in place of the work."""
+    current = threading.local()
+
+    def call(_worker, function, *arguments, on_report=lambda _: None, look=lambda: None, **_):
+        look()
+        current.on_report = on_report
+        return function(*arguments)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Worker, "call", call)
+        patch.setattr(scene_processes, "report", lambda value: current.on_report(value))
+        yield
 
 
 @pytest.fixture(scope="session")

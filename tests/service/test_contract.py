@@ -46,6 +46,9 @@ from tcs.service.ros.ros1_types import ros1_modules, ros1_types
 from tests.placement.store.example import METADATA, score_file
 from tests.service.ros2_peer import ros2_peers
 
+# What is tested is what happens in the processes, or put in its place.
+pytestmark = pytest.mark.usefixtures("in_process")
+
 HERE = (1.4, -1.2, 180.0)
 
 

@@ -16,7 +16,14 @@ from tcs.errors import OutputError, SelectionError, ServiceError
 from tcs.placement.store import save_scores
 from tcs.service import Engine, Limits, SelectRequest
 from tcs.service.client import Client
-from tcs.service.http import Access, Server, checked_access, make_application, protocol
+from tcs.service.http import (
+    Access,
+    Server,
+    checked_access,
+    description,
+    make_application,
+    protocol,
+)
 from tcs.service.http.file_queues import QUEUES, QUICK, STREAK, FileQueues
 from tcs.service.http.protocol import MOST_HEAD_BYTES, MOST_PIPELINED, BoundedProtocol
 from tcs.service.limits import SMALL_REQUEST
@@ -309,6 +316,55 @@ def test_requests_about_a_file_are_answered_in_their_order():
     for file in {one for one, _ in sent}:
         assert [number for one, number in answered if one == file] == list(range(20))
     assert len(threads) <= QUEUES
+
+
+def test_results_are_passed_on_as_they_are(http, engine):
+    # Reading and writing megabytes would keep every other request waiting.
+    text = '{"x":   [1.50, 2]}'
+    job = engine._jobs.submit("plan", lambda _: text).job
+    assert engine.wait(job).result == {"x": [1.5, 2]}
+    found = http.get(f"/v1/jobs/{job}")
+    assert f'"result": {text}' in found.text
+    assert found.json() == engine.job(job).model_dump()
+    assert http.delete(f"/v1/jobs/{job}").json() == found.json()
+    events = http.get(f"/v1/jobs/{job}/events").text
+    assert events == f"event: end\ndata: {found.text}\n\n"
+    assert [one["result"] for one in http.get("/v1/jobs").json() if one["job"] == job] == [None]
+
+
+def test_who_waits_for_a_scene_takes_no_thread_from_others(server, engine, valid, monkeypatch):
+    released = threading.Event()
+    monkeypatch.setattr(engine, "answer_apart", lambda *_: str(released.wait(60.0)).lower())
+    body = json.dumps({"file": valid["file"], "here": valid["here"]}).encode()
+    head = (
+        "POST /v1/posture HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
+        f"Content-Length: {len(body)}\r\n\r\n"
+    )
+    # More than there are threads.
+    waiting = [connected(server) for _ in range(50)]
+    try:
+        for one in waiting:
+            one.sendall(head.encode() + body)
+        time.sleep(0.1)
+        found = httpx.get(f"{server.url}/v1/list", timeout=5.0, trust_env=False)
+        assert found.status_code == 200
+    finally:
+        released.set()
+        assert all(one.recv(4096).endswith(b"true") for one in waiting)
+        for one in waiting:
+            one.close()
+
+
+def test_the_description_is_not_made_where_requests_are_answered(engine, monkeypatch):
+    threads, schemas = [], description.schemas
+    monkeypatch.setattr(
+        description, "schemas", lambda: threads.append(threading.current_thread()) or schemas()
+    )
+    with Server(make_application(engine, Access()), host="127.0.0.1", port=0) as server:
+        for path in ("/docs", "/openapi.json", "/docs"):
+            assert httpx.get(f"{server.url}{path}", trust_env=False).status_code == 200
+    assert [thread.name for thread in threads] != ["tcs-http"]
+    assert len(threads) == 1
 
 
 def test_too_many_requests_at_once_are_refused(engine, monkeypatch):

@@ -12,6 +12,9 @@ from tcs.placement.scoring import rebuild_scene
 from tcs.service import Engine, PostureRequest
 from tests.environments import CORNER, write_environment
 
+# What is tested is what happens in the processes, or put in its place.
+pytestmark = pytest.mark.usefixtures("in_process")
+
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory):

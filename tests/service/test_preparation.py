@@ -10,25 +10,25 @@ import pytest
 import tcs.placement.scoring
 from tcs.errors import SelectionError
 from tcs.placement.store import save_scores
-from tcs.service import Engine, heavy_imports
-from tcs.service.heavy_imports import import_heavy
+from tcs.service import Engine
 from tcs.service.http import Access, Server, make_application
 from tcs.service.preparation import Preparation
 from tcs.service.requests import ScoreHereRequest
 from tests.placement.store.example import score_file
+
+# What is built in the processes is put in its place here.
+pytestmark = pytest.mark.usefixtures("in_process")
 
 
 class Scorers:
     """Stands in for `tcs.LiveScorer`: counts what is built, and scores nothing."""
 
     def __init__(self, monkeypatch, *, compiles=False):
-        self.built, self.compiles, self.may_build = [], compiles, threading.Event()
-        self.may_build.set()
+        self.built, self.compiles = [], compiles
         self.thinned: list[tuple] = []
         monkeypatch.setattr(tcs.placement.scoring, "LiveScorer", self)
 
     def __call__(self, task, environment, robot, *, on_compile, **_options):
-        assert self.may_build.wait(30.0)
         if self.compiles:
             on_compile()
         self.built.append((task, environment, robot))
@@ -59,30 +59,6 @@ def test_the_first_job_finds_its_scene(monkeypatch):
         assert scorers.built[1:] == [("feeding", "wheelchair", "pr2")]
 
 
-def test_a_job_waits_for_what_is_being_built(monkeypatch):
-    scorers = Scorers(monkeypatch)
-    scorers.may_build.clear()
-    # Both are then at the scene within the time that it takes here.
-    import_heavy()
-    with Engine() as engine:
-        engine.prepare()
-        status = engine.submit(ScoreHereRequest.model_validate({"task": "shaving"}))
-        threading.Timer(0.2, scorers.may_build.set).start()
-        assert engine.wait(status.job).problem == "scored"
-    assert len(scorers.built) == 1
-
-
-def test_scoring_waits_for_nothing_that_draws(monkeypatch):
-    Scorers(monkeypatch)
-    imported: list[str] = []
-    monkeypatch.setattr(heavy_imports, "_import", imported.append)
-    with Engine() as engine:
-        assert here(engine) == "scored"
-        assert imported == ["tcs.placement.scoring"]
-        engine.prepare().wait()
-    assert len(imported) > 2
-
-
 def test_the_scene_is_that_of_the_first_file(monkeypatch, tmp_path):
     scorers = Scorers(monkeypatch)
     path = tmp_path / "example.tcs"
@@ -103,7 +79,7 @@ def test_nothing_is_compiled_before_a_job_needs_it(monkeypatch):
         assert len(scorers.built) == 1
 
 
-@pytest.mark.parametrize("error", [MemoryError, OSError, ImportError])
+@pytest.mark.parametrize("error", [MemoryError, OSError, ImportError, RuntimeError])
 def test_a_step_that_fails_is_the_last(error):
     done = []
 

@@ -11,6 +11,9 @@ from tcs.service import Engine, RescoreRequest, SceneRequest
 from tests.environments import BESIDE, write_environment
 
 STEP = 0.2
+# What is tested is what happens in the processes, or put in its place.
+pytestmark = pytest.mark.usefixtures("in_process")
+
 GRID = {**BESIDE, "base_x": (0.2, STEP, 6), "base_y": (0.6, STEP, 3)}
 
 

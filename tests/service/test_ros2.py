@@ -163,7 +163,7 @@ def test_static_frames_from_before_the_node():
 
 
 @pytest.fixture
-def counting(monkeypatch):
+def counting(monkeypatch, in_process):
     """Scoring that counts until it is released."""
     released = threading.Event()
 

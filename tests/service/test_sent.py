@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import threading
+from pathlib import Path
+
+import joblib
 import pytest
 
 from tcs.errors import DataFileError, ServiceError, StoreError
+from tcs.files.compression import decoded_bytes
 from tcs.placement.store import save_scores
-from tcs.service import Engine, Limits, ScoreRequest
+from tcs.service import Engine, Limits, ScoreRequest, SelectRequest
+from tcs.service.score_files import ScoreFiles
 from tcs.service.sent_documents import SentDocuments
+from tcs.service.worker import WorkerPool
 from tests.placement.store.example import METADATA, score_file
+from tests.placement.tables.small import small_grid
 
 
 @pytest.fixture(scope="module")
@@ -30,6 +38,46 @@ def test_a_malformed_person_is_refused_and_its_file_removed(engine, tmp_path, pe
         engine.add_file(path.read_bytes())
     assert engine.files() == []
     assert files_of(engine) == []
+
+
+def test_a_file_that_takes_too_much_memory_is_refused_before_it_is_decoded(tmp_path):
+    path = tmp_path / "large.tcs"
+    save_scores(path, score_file())
+    with Engine(Limits(decoded_bytes=10_000)) as engine:
+        with pytest.raises(StoreError, match=r"that was sent: takes .* bytes of memory; at most"):
+            engine.add_file(path.read_bytes())
+        assert engine.files() == []
+        # What the service itself has made, or was named when it started, is used as it is.
+        assert engine.select(SelectRequest(file=engine.open_file(path).file))["members"]
+
+
+def test_a_file_is_read_again_under_the_same_check(engine, tmp_path):
+    path = tmp_path / "small.tcs"
+    save_scores(path, score_file())
+    held = engine._files.held(engine.add_file(path.read_bytes()).file)
+    save_scores(held.path, score_file(grid=small_grid(nx=9, ny=9, bed=2)))
+    small = Limits(decoded_bytes=decoded_bytes(joblib.load(path), narrow=()))
+    files = ScoreFiles(tmp_path, small, WorkerPool(0, memory=0))
+    files.lend(held)
+    with pytest.raises(StoreError, match="bytes of memory; at most"):
+        files.loaded(held.entry.file)
+
+
+def test_files_are_listed_while_the_content_of_one_is_read(engine, tmp_path, monkeypatch):
+    path = tmp_path / "small.tcs"
+    save_scores(path, score_file())
+    file, listed = engine.open_file(path).file, []
+
+    def read_bytes(_path):
+        listing = threading.Thread(target=lambda: listed.extend(engine.files()), daemon=True)
+        listing.start()
+        listing.join(5.0)
+        return b"content"
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "read_bytes", read_bytes)
+        assert engine.content_of(file) == b"content"
+    assert file in [entry.file for entry in listed]
 
 
 # The process imports Drake.

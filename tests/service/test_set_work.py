@@ -14,7 +14,7 @@ from tests.environments import CORNER, write_environment
 
 HERE = (1.4, -1.2, 180.0)
 AT = tcs.InitialConfiguration(base_x=1.4, base_y=-1.2, base_yaw=math.pi, torso=0.0)
-# Scoring, refinement and the planner: half a minute.
+# Scoring, refinement and the planner: half a minute. The work is done in a process of its own.
 pytestmark = pytest.mark.slow
 
 

@@ -27,6 +27,12 @@ def nap(seconds: float) -> None:
     time.sleep(seconds)
 
 
+def count() -> None:
+    while True:
+        report("counted")
+        time.sleep(0.01)
+
+
 def unknown() -> None:
     raise UnknownNameError("task", "shavign", ["shaving"], where="request")
 
@@ -54,16 +60,31 @@ def test_time_is_limited_and_the_process_is_ended(worker):
         os.kill(process, 0)
 
 
-def test_a_call_that_is_cancelled_ends_the_process(worker):
+def cancelled(worker, function, *arguments):
+    """Cancel a call once it has reported; return what it reported."""
     reported = []
 
     def look():
         if reported:
             raise CancelledError("the job was cancelled.")
 
-    with pytest.raises(CancelledError):
-        worker.call(nap, 60.0, seconds=60, on_report=reported.append, look=look)
-    assert reported == ["begun"]
+    with pytest.raises(CancelledError, match="the job was cancelled"):
+        worker.call(function, *arguments, seconds=60, on_report=reported.append, look=look)
+    return reported
+
+
+def test_a_call_that_is_cancelled_ends_where_it_next_reports(worker):
+    # Scenes that the process keeps are not built again.
+    process = worker.call(os.getpid, seconds=60)
+    assert set(cancelled(worker, count)) == {"counted"}
+    assert worker.call(os.getpid, seconds=60) == process
+
+
+def test_a_cancelled_call_that_does_not_end_is_ended_with_its_process(worker, monkeypatch):
+    monkeypatch.setattr("tcs.service.worker._GRACE", 0.1)
+    process = worker.call(os.getpid, seconds=60)
+    assert cancelled(worker, nap, 60.0) == ["begun"]
+    assert worker.call(os.getpid, seconds=60) != process
 
 
 def test_errors_are_those_of_the_function(worker):

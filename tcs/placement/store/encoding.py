@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import StoreFormatError
-from tcs.files.compression import check_claims, compress, decompress
+from tcs.files.compression import check_claims, compress, decoded_bytes, decompress
 from tcs.files.joblib_file import check_header, header
 from tcs.files.mapped import chunks, large_zeros
 from tcs.files.reader import explained
@@ -55,7 +55,7 @@ def encode(file: ScoreFile) -> dict[str, Any]:
     }
 
 
-def decode(content: object, path: Path | None = None) -> ScoreFile:
+def decode(content: object, path: Path | None = None, most: int | None = None) -> ScoreFile:
     """Return the score file that was encoded.
 
     The scores of each table are decoded when they are first accessed.
@@ -63,13 +63,20 @@ def decode(content: object, path: Path | None = None) -> ScoreFile:
     Args:
         content: What `encode` returned.
         path: Where it was read from, for the messages of scores that turn out damaged.
+        most: Most bytes that its arrays may take once they are decoded; None for any.
 
     Raises:
-        StoreFormatError: If it is not a score file, or of another version.
+        StoreFormatError: If it is not a score file, of another version, or takes more memory.
         TcsError: If its content is inconsistent.
     """
     content = check_header(content, FORMAT, FORMAT_VERSION)
     check_claims(content, exempt=_PER_PAIR)
+    size = decoded_bytes(content, narrow=_PER_PAIR)
+    if most is not None and size > most:
+        raise StoreFormatError(
+            f"takes {size:,} bytes of memory; at most {most:,} are accepted here. Score a coarser "
+            "grid or fewer axes"
+        )
     descriptions = {name: _dict(content.get(name), name) for name in DESCRIPTIONS}
     grid = Grid.from_dict(descriptions["grid"])
     return ScoreFile(

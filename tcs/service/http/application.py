@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import anyio
@@ -30,6 +30,8 @@ _ABOUT = (
     "the SHA-256 of its content: send one with POST /v1/files, or make one with POST /v1/score. "
     "Metres, and degrees under keys that end in _deg."
 )
+_LOOKING = 8
+"""Most threads that wait for the processes that pose scenes."""
 _BEAT = 10.0
 """Longest time between two events of a stream [s]."""
 _FILE, _JSON = "application/octet-stream", "application/json"
@@ -75,9 +77,10 @@ def make_application(engine: Engine, access: Access) -> FastAPI:
     queues = FileQueues()
     # What waits to be read takes no thread from other requests.
     reading = anyio.CapacityLimiter(engine.limits.parsing)
+    looking = anyio.CapacityLimiter(_LOOKING)
     for operation in OPERATIONS:
-        _add_operation(app, engine, operation, queues, reading)
-    _add_files(app, engine, reading)
+        _add_operation(app, engine, operation, queues, reading, looking)
+    _add_files(app, engine, reading, looking)
     _add_jobs(app, engine)
     _add_description(app, engine)
     return app
@@ -99,11 +102,9 @@ def _add_operation(
     operation: Operation,
     queues: FileQueues,
     reading: anyio.CapacityLimiter,
+    looking: anyio.CapacityLimiter,
 ) -> None:
     """Add a request with a body of JSON."""
-    answer: Callable[[Any], Any] = engine.submit
-    if not operation.is_job:
-        answer = getattr(engine, operation.name)
 
     async def endpoint(request: Request) -> Response:
         content = await _json_of(request)
@@ -115,20 +116,23 @@ def _add_operation(
             )
             if operation.takes_turns:
                 # So that nobody waits for it who asks about the same file.
-                found = await anyio.to_thread.run_sync(
-                    engine.answer_apart, operation.name, checked_request, limiter=reading
-                )
-                return _json(found)
+                return await apart(checked_request, reading)
         if operation.takes_turns:
-            kind = operation.kind_of(checked_request)
+            kind, answer = operation.kind_of(checked_request), getattr(engine, operation.name)
             text = await queues.run(
                 checked_request.file, kind, lambda: _text(answer(checked_request))
             )
             return Response(text, media_type=_JSON)
-        result = await anyio.to_thread.run_sync(answer, checked_request)
-        if isinstance(result, JobStatus):
-            return _json(result.model_dump(), status=202)
-        return _json(result)
+        if not operation.is_job:
+            return await apart(checked_request, looking)
+        status = await anyio.to_thread.run_sync(engine.submit, checked_request)
+        return _json(status.model_dump(), status=202)
+
+    async def apart(checked_request: Any, limiter: anyio.CapacityLimiter) -> Response:
+        text = await anyio.to_thread.run_sync(
+            engine.answer_apart, operation.name, checked_request, limiter=limiter
+        )
+        return Response(text, media_type=_JSON)
 
     app.router.add_api_route(
         operation.path, endpoint, methods=["POST"], summary=operation.summary,
@@ -138,7 +142,12 @@ def _add_operation(
     )  # fmt: skip
 
 
-def _add_files(app: FastAPI, engine: Engine, reading: anyio.CapacityLimiter) -> None:
+def _add_files(
+    app: FastAPI,
+    engine: Engine,
+    reading: anyio.CapacityLimiter,
+    looking: anyio.CapacityLimiter,
+) -> None:
     """Add the requests about score files, and the catalogue."""
 
     async def known() -> Response:
@@ -160,7 +169,7 @@ def _add_files(app: FastAPI, engine: Engine, reading: anyio.CapacityLimiter) -> 
         return HTMLResponse(await anyio.to_thread.run_sync(engine.view_of, file), headers=_VIEW)
 
     async def environment(file: str) -> Response:
-        text = await anyio.to_thread.run_sync(engine.environment_of, file)
+        text = await anyio.to_thread.run_sync(engine.environment_of, file, limiter=looking)
         return Response(text, media_type="application/yaml")
 
     async def report(file: str) -> Response:
@@ -193,14 +202,15 @@ def _add_jobs(app: FastAPI, engine: Engine) -> None:
         return _json([status.model_dump() for status in engine.jobs()])
 
     async def job(job: str) -> Response:
-        return _json(engine.job(job).model_dump())
+        return Response(engine.job_text(job), media_type=_JSON)
 
     async def cancel(job: str) -> Response:
-        return _json(engine.cancel(job).model_dump())
+        engine.cancel(job)
+        return Response(engine.job_text(job), media_type=_JSON)
 
     async def events(job: str) -> Response:
         nonlocal streams
-        status = engine.job(job)
+        status = engine.next_state(job, None, 0.0)
         if streams >= engine.limits.streams:
             raise BusyError(f"{streams} streams of events are open, the most at once.")
         streams += 1
@@ -230,7 +240,7 @@ async def _events(
     """Yield the states of a job as events named `progress`, and the last one as `end`."""
     while True:
         name = "end" if status.has_ended else "progress"
-        yield f"event: {name}\ndata: {json.dumps(status.model_dump())}\n\n"
+        yield f"event: {name}\ndata: {engine.job_text(status.job)}\n\n"
         if status.has_ended:
             return
         wait = partial(engine.next_state, status.job, status, _BEAT)
@@ -248,11 +258,18 @@ def _add_description(app: FastAPI, engine: Engine) -> None:
             described["components"] = {"schemas": description.schemas()}
         return described
 
+    @cache
+    def text_of(path: str) -> str:
+        return _text(openapi()) if path == "/openapi.json" else description.page(openapi())
+
+    # Each takes as long as many requests; it is made once, and not where they are answered.
     async def specification() -> Response:
-        return _json(openapi())
+        text = await anyio.to_thread.run_sync(text_of, "/openapi.json")
+        return Response(text, media_type=_JSON)
 
     async def page() -> Response:
-        return HTMLResponse(description.page(openapi()), headers=_REPORT)
+        text = await anyio.to_thread.run_sync(text_of, "/docs")
+        return HTMLResponse(text, headers=_REPORT)
 
     async def about() -> Response:
         from tcs import __version__

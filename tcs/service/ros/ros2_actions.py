@@ -120,6 +120,7 @@ class JobActions:
                 self._publish_feedback(goal, status)
                 time.sleep(_INTERVAL)
                 status = self._engine.next_state(goal.job, status, 60.0)
+            status = self._engine.job(goal.job)
         except TcsError as error:
             self._ended(goal, "failed", problem=str(error))
             return

@@ -12,9 +12,9 @@ import pytest
 
 from tcs.errors import OutputError, StoreError, StoreFormatError
 from tcs.files import compression, mapped
-from tcs.files.compression import compress, decompress
+from tcs.files.compression import compress, decoded_bytes, decompress
 from tcs.placement.store import FORMAT_VERSION, ScoreFile, load_scores, save_scores
-from tcs.placement.store.encoding import encode
+from tcs.placement.store.encoding import _PER_PAIR, encode
 from tests.placement.store.example import SHIFT, score_file
 from tests.placement.tables.small import small_grid
 
@@ -428,6 +428,44 @@ def test_a_claim_beyond_what_the_file_holds_allocates_nothing(path, file, name, 
         tracemalloc.stop()
     # The file, its unpickled bytes, and what the sound parts decompress to.
     assert peak < 4 * size + 16 * 1024**2
+
+
+def test_a_table_that_is_there_many_times_is_counted_as_often(path):
+    """Each is decoded anew: before, 1,000 of them took the time and memory of as many."""
+    content = encode(score_file(grid=small_grid(nx=8, ny=8, bed=2), observed=[SHIFT], tables=3))
+    content["observed"] = [{**SHIFT, "step": 1e-4, "count": 1000}]
+    content["tables"] = 1000 * content["tables"][:1]
+    joblib.dump(content, path)
+    assert path.stat().st_size < 1024**2
+    with pytest.raises(StoreFormatError, match="claims arrays of"):
+        load_scores(path)
+
+
+GROUPS = {
+    "pairs": ("pair_step", "pair_count", "reachability_code", "pair_manipulability", "pair_sum"),
+    "triples": ("step", "count", "reachability", "manipulability", "total"),
+}
+
+
+@pytest.mark.parametrize("of", GROUPS)
+def test_reading_takes_four_times_the_memory_of_the_arrays_at_most(path, of):
+    """Small numbers are decoded to larger ones, and compared as larger ones still."""
+    grid = small_grid(nx=24, ny=24, yaws=1, torsos=1)
+    content = encode(score_file(grid=grid, options={"max_members": 3}))
+    sets = content["tables"][0]["sets"]
+    group = sets if of == "pairs" else sets["triples"]
+    group |= {name: compress(np.ones(200_000, group[name]["type"])) for name in GROUPS[of]}
+    joblib.dump(content, path)
+    size = decoded_bytes(content, narrow=_PER_PAIR)
+    tracemalloc.start()
+    try:
+        with pytest.raises(StoreFormatError, match=r"ascending|lexicographic|does not fit"):
+            load_scores(path)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert size > 8_000_000
+    assert peak < 4 * size
 
 
 def test_a_table_beyond_the_memory_is_mapped_and_the_same(path, file, monkeypatch):
