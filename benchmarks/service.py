@@ -76,17 +76,19 @@ class Served:
 
 
 @contextmanager
-def served(file: Path, source: Path | None) -> Iterator[Served]:
+def served(file: Path, source: Path | None, *options: str) -> Iterator[Served]:
     """Run a server that holds a file, once it has prepared what its first job needs.
 
     Args:
         file: The file.
         source: Folder with the package that serves; None for the one that is installed.
+        *options: Further options of `tcs serve`.
     """
     environment = os.environ | ({} if source is None else {"PYTHONPATH": str(source.resolve())})
     with tempfile.TemporaryFile("w+") as log:
         server = subprocess.Popen(
-            [sys.executable, "-P", "-m", "tcs", "serve", str(file.resolve()), "--port", "0"],
+            [sys.executable, "-P", "-m", "tcs", "serve", str(file.resolve()), "--port", "0",
+             *options],
             stdout=subprocess.PIPE, stderr=log, text=True, env=environment,
         )  # fmt: skip
         try:

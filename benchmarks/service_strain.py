@@ -5,9 +5,9 @@ Usage: python benchmarks/service_strain.py FILE [--seconds 5] [--only NAME] [--s
 
 FILE is a score file made by `tcs score`. One client sends a selection every 10 ms, first alone and
 then while another process sends one of the requests below again and again for some seconds; of a
-job, until it has ended. "memory" is how much more the process that answers takes at most meanwhile;
-"a new client" how long one that connects last waits for its selection. `--source` runs a server of
-another version of tcs.
+job, until it has ended. Nothing is prepared before. "memory" is how much more the process that
+answers takes at most meanwhile; "a new client" how long one that connects last waits for its
+selection. `--source` runs a server of another version of tcs.
 """
 
 from __future__ import annotations
@@ -200,7 +200,7 @@ def main() -> int:
     failed = False
     for name, strain in STRAINS.items():
         if options.only in name:
-            with served(options.file, options.source) as server:
+            with served(options.file, options.source, "--no-prepare") as server:
                 asked = Asked(load_scores(options.file), server.digest, options.seed)
                 measure(name, strain, server, asked, options.file, options.seconds)
             failed |= server.failed or server.traces > 0

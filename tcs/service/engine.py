@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -163,14 +163,18 @@ class Engine:
         """Return the score files that are held."""
         return self._files.entries()
 
-    def add_file(self, content: bytes) -> FileEntry:
+    def add_file(self, content: bytes | Sequence[bytes]) -> FileEntry:
         """Check a score file that was sent and hold it; nothing in it is called or imported.
+
+        Args:
+            content: The bytes of the file, or parts of them in their order.
 
         Raises:
             StoreError: If it is not a score file.
             ServiceError: If it is too large.
         """
-        return self._files.add(content).entry
+        parts = [content] if isinstance(content, bytes) else content
+        return self._files.add(parts).entry
 
     def open_file(self, path: Path) -> FileEntry:
         """Hold a score file of this machine until the engine is closed; not for requests.

@@ -7,6 +7,7 @@ import itertools
 import shutil
 import threading
 from collections import OrderedDict
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -77,11 +78,13 @@ class ScoreFiles:
         self._motions: OrderedDict[str, MotionFile] = OrderedDict()
         self._number = itertools.count()
 
-    def add(self, content: bytes, *, is_ours: bool = False, is_pinned: bool = False) -> HeldFile:
+    def add(
+        self, content: Sequence[bytes], *, is_ours: bool = False, is_pinned: bool = False
+    ) -> HeldFile:
         """Check a score file and hold it; the same content is held once.
 
         Args:
-            content: The bytes of the file.
+            content: The bytes of the file, in parts.
             is_ours: Whether it was made here or named when the service started.
             is_pinned: Whether it stays until the service ends.
 
@@ -89,16 +92,21 @@ class ScoreFiles:
             StoreError: If it is not a score file.
             BusyError: If it does not fit beside the pinned files.
         """
-        if len(content) > self._limits.file_bytes and not is_ours:
+        size = sum(map(len, content))
+        if size > self._limits.file_bytes and not is_ours:
             raise ServiceError(
-                f"the score file has {len(content):,} bytes; at most {self._limits.file_bytes:,} "
+                f"the score file has {size:,} bytes; at most {self._limits.file_bytes:,} "
                 "are accepted."
             )
-        digest = hashlib.sha256(content).hexdigest()
+        known = hashlib.sha256()
+        for part in content:
+            known.update(part)
+        digest = known.hexdigest()
         if not self._uses(digest, is_ours=is_ours, is_pinned=is_pinned):
             with scratch_folder() as folder:
                 path = folder / "sent.tcs"
-                path.write_bytes(content)
+                with path.open("wb") as stream:
+                    stream.writelines(content)
                 # Outside the lock: it takes up to seconds, in which other files are used.
                 try:
                     entry = self._entry_of(path, digest, is_ours=is_ours)
@@ -188,7 +196,7 @@ class ScoreFiles:
         content = read_bytes(
             path, f"Score file '{path}'", StoreError, limit=self._limits.stored_bytes
         )
-        held = self.add(content, is_ours=True, is_pinned=True)
+        held = self.add([content], is_ours=True, is_pinned=True)
         beside = motion_path(path)
         if beside.exists():
             motions = load_motions(beside)

@@ -243,6 +243,17 @@ def test_contents_are_limited_together(engine, monkeypatch):
             assert httpx.get(f"{server.url}/v1", trust_env=False).status_code == 200
 
 
+def test_a_large_content_is_not_copied_as_a_whole(engine, monkeypatch):
+    content, sent = random.Random(0).randbytes(5_000_000), []
+    monkeypatch.setattr(Engine, "limits", Limits())
+    monkeypatch.setattr(engine, "add_file", lambda parts: sent.extend(parts) or engine.files())
+    with Server(make_application(engine, Access()), host="127.0.0.1", port=0) as server:
+        httpx.post(f"{server.url}/v1/files", content=content, trust_env=False)
+    assert b"".join(sent) == content
+    # Copying megabytes would keep all other requests waiting.
+    assert max(map(len, sent)) < 2 * 1024**2
+
+
 def burn(seconds: float) -> None:
     """Take time of the processor."""
     end = time.thread_time() + 1.01 * seconds

@@ -157,8 +157,8 @@ def _add_files(
         return _json([entry.model_dump() for entry in engine.files()])
 
     async def send(request: Request) -> Response:
-        content = await request.body()
-        entry = await anyio.to_thread.run_sync(engine.add_file, content, limiter=reading)
+        parts = [part async for part in request.stream()]
+        entry = await anyio.to_thread.run_sync(engine.add_file, parts, limiter=reading)
         return _json(entry.model_dump(), status=201)
 
     async def fetch(file: str) -> Response:

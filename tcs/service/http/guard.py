@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 import logging
 import secrets
-from collections.abc import Awaitable, Callable, MutableMapping
+from collections import deque
+from collections.abc import Awaitable, Callable, MutableMapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +26,8 @@ _HEADERS = (
 )
 _POLICY = (b"content-security-policy", b"default-src 'none'; frame-ancestors 'none'; sandbox")
 """Of a response that states none: nothing in it is run, wherever its texts come from."""
+_PART = 1024**2
+"""Least bytes of the parts of a content, but for the last one."""
 _LOG = logging.getLogger(__name__)
 
 
@@ -94,8 +97,8 @@ class Guard:
 
     async def _content(
         self, scope: Message, receive: Receive, counted: Callable[[int], int]
-    ) -> bytes:
-        """Return the content of a request.
+    ) -> list[bytes]:
+        """Return the content of a request, in parts: copying all of it would take milliseconds.
 
         Args:
             scope: The request.
@@ -107,23 +110,29 @@ class Guard:
         """
         limits = self._limits
         most = limits.file_bytes if scope["path"] == "/v1/files" else limits.request_bytes
-        content = bytearray()
+        parts: list[bytes] = []
+        part = bytearray()
         try:
             async with asyncio.timeout(limits.request_seconds):
                 while True:
                     message = await receive()
                     if message["type"] != "http.request":
                         raise _RefusedError
-                    content += message.get("body", b"")
-                    if counted(len(message.get("body", b""))) > most:
+                    part += message.get("body", b"")
+                    size = counted(len(message.get("body", b"")))
+                    if size > most:
                         text = f"the request has more than {most:,} bytes, the limit."
                         raise _RefusedError(problem(413, "TooLarge", text))
                     # Large contents that fill the memory keep no small one out.
-                    if len(content) > limits.request_bytes and self._bytes > limits.content_bytes:
+                    if size > limits.request_bytes and self._bytes > limits.content_bytes:
                         text = "the contents of all requests fill the memory for them. Try again."
                         raise _RefusedError(problem(BUSY, "BusyError", text))
-                    if not message.get("more_body", False):
-                        return bytes(content)
+                    is_last = not message.get("more_body", False)
+                    if is_last or len(part) >= _PART:
+                        parts.append(bytes(part))
+                        part.clear()
+                    if is_last:
+                        return parts
         except TimeoutError:
             text = f"the content of the request took longer than {limits.request_seconds:g} s."
             raise _RefusedError(problem(408, "TooSlow", text)) from None
@@ -191,15 +200,13 @@ def _name_of(host: str) -> str:
     return (name if colon and port.isdecimal() else host).lower()
 
 
-def _again(content: bytes, receive: Receive) -> Receive:
-    """Return a function that returns the whole content of a request, and then the rest."""
-    is_first = True
+def _again(parts: Sequence[bytes], receive: Receive) -> Receive:
+    """Return a function that returns the parts of the content of a request, and then the rest."""
+    left = deque(parts)
 
     async def received() -> Message:
-        nonlocal is_first
-        if is_first:
-            is_first = False
-            return {"type": "http.request", "body": content, "more_body": False}
+        if left:
+            return {"type": "http.request", "body": left.popleft(), "more_body": bool(left)}
         # Only the end of the connection may follow, at any time.
         return await receive()
 
