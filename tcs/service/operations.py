@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tcs.files.documents import Document
+from tcs.placement.selection.distances import ROUTES
 from tcs.service.requests import (
     EvaluateRequest,
     ExplainRequest,
@@ -53,6 +54,14 @@ class Operation:
             request.here is None,
             *((name, repr(getattr(request, name))) for name in sorted(fields)),
         )
+
+    @staticmethod
+    def is_long(request: Any) -> bool:
+        """Return whether a step of the work lets no other thread of its process go on for long.
+
+        The search for paths around the furniture takes as long as a hundred selections.
+        """
+        return getattr(request, "travel", ROUTES[0]) != ROUTES[0]
 
     @property
     def path(self) -> str:

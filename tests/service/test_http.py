@@ -6,6 +6,7 @@ import asyncio
 import json
 import random
 import socket
+import sys
 import threading
 import time
 
@@ -349,7 +350,7 @@ def test_who_waits_for_a_scene_takes_no_thread_from_others(server, engine, valid
     body = json.dumps({"file": valid["file"], "here": valid["here"]}).encode()
     head = (
         "POST /v1/posture HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
-        f"Content-Length: {len(body)}\r\n\r\n"
+        f"Connection: close\r\nContent-Length: {len(body)}\r\n\r\n"
     )
     # More than there are threads.
     waiting = [connected(server) for _ in range(50)]
@@ -361,9 +362,10 @@ def test_who_waits_for_a_scene_takes_no_thread_from_others(server, engine, valid
         assert found.status_code == 200
     finally:
         released.set()
-        assert all(one.recv(4096).endswith(b"true") for one in waiting)
+        answers = [received(one) for one in waiting]
         for one in waiting:
             one.close()
+    assert all(one.endswith(b"true") for one in answers)
 
 
 def test_the_description_is_not_made_where_requests_are_answered(engine, monkeypatch):
@@ -547,6 +549,27 @@ def test_large_requests_are_read_in_another_process(http, engine, valid, monkeyp
     assert len(called) == 2
     assert {**large.json(), "seconds": 0} == {**small.json(), "seconds": 0}
     refused(http.post("/v1/select", json={**valid, "x" * SMALL_REQUEST: 1}), 422)
+
+
+def test_paths_around_the_furniture_are_sought_in_another_process(http, engine, valid, monkeypatch):
+    """The search lets no thread of its process go on."""
+    called, call = [], engine.answer_apart
+    monkeypatch.setattr(
+        engine, "answer_apart", lambda name, request: called.append(name) or call(name, request)
+    )
+    for fields, expected in (({}, []), ({"travel": "around"}, ["select"])):
+        found = http.post("/v1/select", json={**valid, **fields})
+        assert called == expected
+        request = SelectRequest(**valid, **fields)
+        assert {**found.json(), "seconds": 0} == {**engine.select(request), "seconds": 0}
+    # It goes around the furniture by default; there may be no such path.
+    assert http.post("/v1/explain", json={**valid, "goal": 0}).status_code in (200, 422)
+    assert called == ["select", "explain"]
+
+
+def test_the_thread_that_answers_has_its_turn_soon(http):
+    assert http.get("/v1").status_code == 200
+    assert sys.getswitchinterval() < 0.001
 
 
 def test_files_are_listed_while_another_one_is_read(http, engine, monkeypatch):

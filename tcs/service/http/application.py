@@ -114,9 +114,10 @@ def _add_operation(
             checked_request = await anyio.to_thread.run_sync(
                 engine.request_of, operation.request, content, limiter=reading
             )
-            if operation.takes_turns:
-                # So that nobody waits for it who asks about the same file.
-                return await apart(checked_request, reading)
+        is_large = len(content) > SMALL_REQUEST
+        if operation.takes_turns and (is_large or operation.is_long(checked_request)):
+            # So that nobody waits for it who asks about the same file, or anything else.
+            return await apart(checked_request, reading)
         if operation.takes_turns:
             kind, answer = operation.kind_of(checked_request), getattr(engine, operation.name)
             text = await queues.run(

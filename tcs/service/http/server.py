@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ipaddress
 import socket
+import sys
 import threading
 from collections.abc import Callable
 from types import TracebackType
@@ -19,6 +20,9 @@ _LEAST_TOKEN = 16
 """Fewest characters of a token."""
 _GRACE = 2
 """Longest wait for open requests at the end [s]."""
+_TURN = 0.0005
+"""Longest time for which Python lets another thread go on while the one that answers waits [s]; by
+default it is ten times as long, which is far more than a selection takes."""
 _KEEP_ALIVE = 20
 """Time after which an idle connection is closed [s]."""
 
@@ -122,6 +126,7 @@ class Server:
         end.daemon = True
         if duration is not None:
             end.start()
+        sys.setswitchinterval(_TURN)
         try:
             self._server.run(sockets=[self._socket])
         finally:
