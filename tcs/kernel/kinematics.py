@@ -128,6 +128,16 @@ def fill_jacobian(link_R: FloatArray, link_p: FloatArray, tool: FloatArray, J: F
         J[3, i], J[4, i], J[5, i] = y * dz - z * dy, z * dx - x * dz, x * dy - y * dx
 
 
+@inner
+def fill_sliding(chain_p: FloatArray, link_R: FloatArray, J: FloatArray) -> None:
+    """Replace the columns of prismatic joints in a Jacobian as `fill_jacobian` fills it."""
+    if chain_p.shape[1] > 3:
+        for i in range(7):
+            if chain_p[i, 3] > 0.0:
+                for r in range(3):
+                    J[r, i], J[3 + r, i] = 0.0, chain_p[i, 3] * link_R[i + 1, r, 2]
+
+
 @jit
 def jacobian(chain_R: FloatArray, chain_p: FloatArray, q: FloatArray, J: FloatArray) -> None:
     """Fill the Jacobian of the tool in the arm base A.
@@ -145,11 +155,7 @@ def jacobian(chain_R: FloatArray, chain_p: FloatArray, q: FloatArray, J: FloatAr
         offset = R[7, r, 0] * f[0] + R[7, r, 1] * f[1] + R[7, r, 2] * f[2]
         tool[r] = p[7, r] + offset
     fill_jacobian(R, p, tool, J)
-    if chain_p.shape[1] > 3:
-        for i in range(7):
-            if chain_p[i, 3] > 0.0:
-                for r in range(3):
-                    J[r, i], J[3 + r, i] = 0.0, chain_p[i, 3] * R[i + 1, r, 2]
+    fill_sliding(chain_p, R, J)
 
 
 @inner

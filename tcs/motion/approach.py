@@ -16,7 +16,7 @@ from tcs.kernel.motion.straight import (
     new_straight_workspace,
     next_straight,
 )
-from tcs.model.tasks import TOOL_SPEED, ToolLine
+from tcs.model.tasks import TOOL_SPEED, Goal, ToolLine
 from tcs.motion.curves import Curve
 from tcs.motion.stops import BodyPair, Stop
 
@@ -73,7 +73,7 @@ def accesses(stop: Stop, goal: int) -> Accesses:
         goal: Number of the goal.
     """
     search = _Search(stop, goal)
-    for samples in SAMPLES:
+    for samples in SAMPLES if stop.is_sampled else SAMPLES[:1]:
         for forwards in (False, True):
             found = list(search.follow(samples, forwards=forwards))
             if found:
@@ -111,7 +111,7 @@ class _Search:
         stop, goal = self.stop, self.goal
         begin = self.p_AG - self.R_AG @ goal.approach.offset if forwards else self.p_AG
         line = goal.approach if forwards else goal.approach.reverse()
-        postures = postures_at(stop.problem, self.R_AG, begin, samples)
+        postures = postures_at(stop.problem, self.R_AG, begin, samples, may_turn=_may_turn(goal))
         search = self._search(postures, line, self.before if forwards else self.at_goal)
         n = 0
         while n < len(postures):
@@ -156,6 +156,13 @@ class _Search:
         if self.outcomes[LIMITS]:
             return Accesses((), "approach_limits", None)
         return Accesses((), "unreached", self.stop.most_frequent(self.at_goal))
+
+
+def _may_turn(goal: Goal) -> bool:
+    """Return whether a goal is the same, with its lines, from all sides of an axis."""
+    lines = goal.approach.offset, goal.retreat.offset
+    free = goal.free
+    return free is not None and free.rotates and not np.any(np.cross(lines, free.axis).round(9))
 
 
 def _spread(stop: Stop, found: list[Access]) -> tuple[Access, ...]:

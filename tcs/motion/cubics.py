@@ -17,7 +17,7 @@ AT_ONCE = 1e-6
 
 
 class Extremes(NamedTuple):
-    """Greatest and least values of the joints on a motion, each of shape (7,)."""
+    """Greatest and least values of the joints on a motion, each of shape (n,) for n joints."""
 
     least: FloatArray
     """Least angles [rad]."""
@@ -44,7 +44,7 @@ def extremes(timing: Timed) -> Extremes:
     angles = timing.positions[:-1] + at * (v + at * (b + at * c))
     velocities = v + at * (2.0 * b + 3.0 * at * c)
     begin, end = 2.0 * b, 2.0 * b + 6.0 * c * h
-    at_rest = np.zeros((1, 7))
+    at_rest = np.zeros((1, v.shape[1]))
     jumps = np.concatenate([begin, at_rest]) - np.concatenate([at_rest, end])
     jerk = np.concatenate([6.0 * c, jumps / AT_ONCE])
     return Extremes(

@@ -9,10 +9,31 @@ import numpy as np
 
 from tcs.kernel.arrays import FloatArray, IntArray
 
+CHAIN = 7
+"""Number of joints of the kernel's chain."""
+
+
+def in_chain(joints: FloatArray, fill: float = 0.0) -> FloatArray:
+    """Return values of an arm's joints as those of the kernel's chain, which has seven.
+
+    Args:
+        joints: One value for each joint of the arm, shape (..., n).
+        fill: That of the joints that the arm lacks, which come first.
+
+    Returns:
+        Shape (..., 7).
+    """
+    lacking = np.full((*joints.shape[:-1], CHAIN - joints.shape[-1]), fill)
+    return np.concatenate([lacking, joints], axis=-1)
+
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A cubic Hermite spline of joint angles."""
+    """A cubic Hermite spline of joint angles [rad], of positions [m] where joints are prismatic.
+
+    Shapes are those of the kernel's chain, of seven joints; the motions of a plan have those of the
+    arm alone.
+    """
 
     knots: FloatArray
     """Parameter at each knot, ascending from 0, shape (n,)."""
@@ -60,6 +81,10 @@ class Curve:
         first = 3.0 * (u**2 * (b - a) + 2 * u * t * (c - b) + t**2 * (d - c)) / length
         second = 6.0 * (u * (c - 2 * b + a) + t * (d - 2 * c + b)) / length**2
         return position, first, second
+
+    def in_chain(self) -> Curve:
+        """Return the same curve with the joints of the kernel's chain, which remain at 0."""
+        return replace(self, q=in_chain(self.q), dq=in_chain(self.dq))
 
     def reverse(self) -> Curve:
         """Return the same curve from its end to its begin."""

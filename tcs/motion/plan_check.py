@@ -14,6 +14,7 @@ from tcs.kernel.motion.straight import OFF_LINE
 from tcs.model.scene import goal_poses
 from tcs.model.tasks import TOOL_SPEED
 from tcs.motion.cubics import at_times, extremes
+from tcs.motion.curves import CHAIN
 from tcs.motion.motion_plan import MotionPlan, Segment, StopPlan
 from tcs.motion.plans import value_of
 from tcs.motion.recheck import StopCheck
@@ -115,8 +116,11 @@ def check_plan(
                 measured = _tool(segment.timing, stop)
                 speed, off_line = max(speed, measured[0]), max(off_line, measured[1])
             found = extremes(segment.timing)
-            velocity = max(velocity, float(np.max(found.velocity / stop.velocity)))
-            acceleration = max(acceleration, float(np.max(found.acceleration / stop.acceleration)))
+            own = slice(CHAIN - stop.joints, None)
+            velocity = max(velocity, float(np.max(found.velocity / stop.velocity[own])))
+            acceleration = max(
+                acceleration, float(np.max(found.acceleration / stop.acceleration[own]))
+            )
             if plan.jerk_limits is not None:
                 jerk = max(jerk, float(np.max(found.jerk / plan.jerk_limits)))
             done += 1
@@ -165,7 +169,7 @@ def check_names(plan: MotionPlan, job: Job) -> None:
 
 def _jumps(planned: StopPlan, stop: Stop) -> int:
     """Return how many segments do not begin where the one before ended, or not at rest."""
-    where = stop.rest
+    where = rest = stop.rest[CHAIN - stop.joints :]
     jumps = 0
     for segment in planned.segments:
         timing = segment.timing
@@ -173,7 +177,7 @@ def _jumps(planned: StopPlan, stop: Stop) -> int:
         jumps += int(np.any(moved > ROUNDING))
         where = timing.positions[-1]
     if planned.segments and planned.returns:
-        jumps += int(np.any(np.abs(where - stop.rest) > ROUNDING))
+        jumps += int(np.any(np.abs(where - rest) > ROUNDING))
     return jumps
 
 
@@ -189,6 +193,7 @@ def _tool(timing: Timed, stop: Stop) -> tuple[float, float]:
     end = scene.tool_pose()
     scene.set_arm(timing.positions[0])
     begin = scene.tool_pose()
+    axis = stop.problem.turn
     line = end.translation() - begin.translation()
     line = line / max(float(np.linalg.norm(line)), POSITION_BAR)
 
@@ -200,6 +205,11 @@ def _tool(timing: Timed, stop: Stop) -> tuple[float, float]:
             pose = scene.tool_pose()
             away = pose.translation() - begin.translation()
             turned = begin.rotation().inverse().multiply(pose.rotation()).ToAngleAxis().angle()
+            if np.any(axis):
+                # An arm of five joints may rotate the tool about this axis.
+                turned = np.linalg.norm(
+                    (begin.rotation().matrix() - pose.rotation().matrix()) @ axis
+                )
             off.extend([float(np.linalg.norm(away - (away @ line) * line)), float(turned)])
         return found
 
@@ -214,8 +224,14 @@ def _tool(timing: Timed, stop: Stop) -> tuple[float, float]:
 
 
 def _position_error(segment: Segment, stop: Stop) -> float:
-    """Return the distance of the tool from its goal at the end of an approach [m]."""
-    scene = stop.scene
+    """Return the distance of the tool from its goal at the end of an approach [m].
+
+    Of a free goal it is the distance from the nearest pose that serves, or the angle [rad].
+    """
+    scene, task = stop.scene, stop.job.task
     scene.set_arm(segment.timing.positions[-1])
-    X_WG = goal_poses(scene, stop.job.task)[segment.end or 0]
-    return float(np.linalg.norm(scene.tool_pose().translation() - X_WG.translation()))
+    X_GT = goal_poses(scene, task)[segment.end or 0].inverse() @ scene.tool_pose()
+    free = task.goals[segment.end or 0].free
+    if free is not None:
+        return max(free.errors(X_GT.rotation().matrix(), X_GT.translation()))
+    return float(np.linalg.norm(X_GT.translation()))

@@ -216,7 +216,7 @@ def _is_free(stop: Stop, planned: StopPlan) -> bool:
 
 
 def _segment_is_free(stop: Stop, segment: Segment) -> bool:
-    curve = segment.curve
+    curve = segment.curve.in_chain()
     return all(
         certified(stop.lines, stop.line_work, curve.control_points(piece)) == 1.0
         for piece in range(curve.pieces)

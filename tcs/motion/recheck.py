@@ -7,10 +7,10 @@ import itertools
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray
-from tcs.kernel.motion.scene import MotionScene
+from tcs.kernel.motion.scene import FRAMES, MotionScene
 from tcs.model.scene import NeighbourList, Scene
 from tcs.motion.cubics import extremes
-from tcs.motion.curves import Curve
+from tcs.motion.curves import Curve, in_chain
 from tcs.motion.keep_out import scene_with_keep_out, spec_with_keep_out
 from tcs.motion.motion_plan import Segment
 from tcs.motion.stops import Stop
@@ -66,6 +66,7 @@ def false_pieces(neighbours: NeighbourList, motion: MotionScene, curve: Curve) -
         motion: The same scene, for the motion of its shapes.
         curve: A curve of the scored arm.
     """
+    curve = curve.in_chain()
     return sum(
         not (
             _is_within_limits(neighbours.scene, curve, piece)
@@ -78,7 +79,7 @@ def false_pieces(neighbours: NeighbourList, motion: MotionScene, curve: Curve) -
 def _is_within_limits(scene: Scene, curve: Curve, piece: int) -> bool:
     both = slice(piece, piece + 2)
     found = extremes(Timed(curve.knots[both], curve.q[both], curve.dq[both]))
-    lower, upper = scene.arm_limits
+    lower, upper = (in_chain(limits) for limits in scene.arm_limits)
     return bool(
         np.all(found.least >= lower - LIMIT_ROUNDING)
         and np.all(found.greatest <= upper + LIMIT_ROUNDING)
@@ -117,15 +118,27 @@ def shape_corners(motion: MotionScene, q: FloatArray) -> FloatArray:
     signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3))) / np.sqrt(3.0)
     R, p = np.repeat(np.eye(3)[None], len(q), axis=0), np.zeros((len(q), 3))
     corners = []
-    for link in range(1, 8):
-        p = p + R @ motion.chain_p[link - 1]
-        c, s = np.cos(q[:, link - 1]), np.sin(q[:, link - 1])
-        turn = np.zeros((len(q), 3, 3))
-        turn[:, 0, 0], turn[:, 0, 1], turn[:, 1, 0], turn[:, 1, 1] = c, -s, s, c
-        turn[:, 2, 2] = 1.0
-        R = R @ motion.chain_R[link - 1] @ turn
+
+    def add(link: int, origin: FloatArray) -> None:
         shapes = motion.links[motion.link_frame == link]
         # Column 1 is the radius of the bounding sphere, columns 2 to 4 are sizes.
         local = (shapes[:, None, 5:8] + shapes[:, None, 1:2] * signs).reshape(-1, 3)
-        corners.append(p[:, None] + local @ R.transpose(0, 2, 1))
+        corners.append(origin[:, None] + local @ R.transpose(0, 2, 1))
+
+    for joint, slide in enumerate(motion.slides):
+        p = p + R @ motion.chain_p[joint, :3]
+        R = R @ motion.chain_R[joint]
+        if slide > 0.0:
+            along = slide * q[:, joint, None] * R[:, :, 2]
+            for n, (coupled, part) in enumerate(motion.coupled):
+                if coupled == joint:
+                    add(FRAMES + n, p + part * along)
+            p = p + along
+        else:
+            c, s = np.cos(q[:, joint]), np.sin(q[:, joint])
+            turn = np.zeros((len(q), 3, 3))
+            turn[:, 0, 0], turn[:, 0, 1], turn[:, 1, 0], turn[:, 1, 1] = c, -s, s, c
+            turn[:, 2, 2] = 1.0
+            R = R @ turn
+        add(joint + 1, p)
     return np.concatenate(corners, axis=1)

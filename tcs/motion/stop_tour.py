@@ -10,7 +10,7 @@ import numpy as np
 
 from tcs.kernel.arrays import FloatArray
 from tcs.motion.approach import Access, Accesses, accesses, joint_time
-from tcs.motion.curves import Curve
+from tcs.motion.curves import CHAIN, Curve, in_chain
 from tcs.motion.limits import MotionLimits
 from tcs.motion.motion_plan import GoalResult, Segment, StopPlan, joined
 from tcs.motion.paths import WIDEST_CORNER, find_path, is_certified, rounded
@@ -43,14 +43,15 @@ def plan_stop(
         number: Number of the stop in the plan.
         goals: Numbers of the goals.
         order: Order of the goals, one of ORDERS.
-        jerk: Jerk limits [rad/s^3], shape (7,), inf for joints without one; None for no limits.
+        jerk: Jerk limits [rad/s^3], one for each joint of the arm, inf for joints without one; None
+            for no limits.
         on_step: Called with the finished fraction after each goal is approached, and after each is
             visited; what it raises ends the planning.
 
     Returns:
         The motions, and what became of each goal.
     """
-    tour = _Tour(stop, number, np.full(7, np.inf) if jerk is None else jerk)
+    tour = _Tour(stop, number, np.full(stop.joints, np.inf) if jerk is None else jerk)
     blocked = stop.rest_contact()
     steps = 2 * len(goals) + 1
     for done, goal in enumerate(goals, 1):
@@ -73,6 +74,7 @@ class _Tour:
     def __init__(self, stop: Stop, number: int, jerk: FloatArray) -> None:
         self.stop, self.number = stop, number
         joints = stop.motion.lower, stop.motion.upper
+        jerk = in_chain(jerk, np.inf)
         self.limits = MotionLimits(stop.velocity, stop.acceleration, jerk, *joints)
         self.found: dict[int, Accesses] = {}
         self.results: dict[int, GoalResult] = {}
@@ -135,7 +137,7 @@ class _Tour:
         self._append("move", self.goal, goal, moves)
         self._append("approach", goal, goal, approach)
         self._append("retreat", goal, goal, retreat)
-        self.q, self.goal = self.segments[-1].timing.positions[-1], goal
+        self.q, self.goal = in_chain(self.segments[-1].timing.positions[-1]), goal
         self.results[goal] = GoalResult(goal, self.number, True, "")
 
     def go_home(self) -> bool:
@@ -191,7 +193,8 @@ class _Tour:
         self, kind: str, start: int | None, end: int | None, motions: Sequence[Curve]
     ) -> None:
         if motions:
-            timing = joined([Timed(motion.knots, motion.q, motion.dq) for motion in motions])
+            own = slice(CHAIN - self.stop.joints, None)
+            timing = joined([Timed(one.knots, one.q[:, own], one.dq[:, own]) for one in motions])
             self.segments.append(Segment(kind, start, end, timing))
 
     def fail(

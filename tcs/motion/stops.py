@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tcs.errors import TaskError
+from tcs.kernel.analytic.solver import is_outside
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.motion.edges import posture_contact
 from tcs.kernel.motion.groups import grouped
@@ -30,6 +30,8 @@ from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.rows import rows_at
 from tcs.model.grid import Axis, Grid, InitialConfiguration
 from tcs.model.scene import LoweredScene, Scene, lower
+from tcs.motion.curves import CHAIN, in_chain
+from tcs.motion.free_goals import FreeGoalPoses
 from tcs.motion.keep_out import with_keep_out
 from tcs.placement.scoring.job import Job
 
@@ -69,11 +71,17 @@ class StopGrid:
     problem: Problem
     """The same as the kernel takes it."""
     rests: FloatArray
-    """Rest postures of the arm [rad], in the order in which they are tried, shape (n, 7)."""
+    """Rest postures of the arm [rad], in the order in which they are tried, shape (n, 7).
+
+    As everywhere here, joints are those of the kernel's chain: the first ones, which an arm of
+    fewer than seven lacks, remain at 0."""
     velocity: FloatArray
     """Velocity limits [rad/s], shape (7,)."""
     acceleration: FloatArray
     """Acceleration limits [rad/s^2], shape (7,)."""
+    poses: FreeGoalPoses | None = None
+    """Where in its freedom each goal is reached, the environment being where it is expected; None
+    if every goal is a single pose."""
     scenes: dict[int, tuple[MotionScene, MotionScene]] = field(default_factory=dict)
     """For each torso level met so far, the scenes of paths and of straight motions, with the
     environment in no particular place."""
@@ -89,16 +97,15 @@ class StopGrid:
             lowered: Scene and configurations as arrays, without boxes that paths keep out of.
 
         Raises:
-            RobotError: If a velocity limit is unknown, or the arm does not have seven joints.
-            TaskError: If a goal is free.
+            RobotError: If a velocity limit is unknown.
         """
-        job.spec.robot.require_seven_joints("planning motions")
+        rates = np.array(job.spec.robot.arm_rates())
+        # Those of joints that never move decide nothing.
+        velocity, acceleration = in_chain(rates, 1.0)
+        poses = None
         if job.task.has_freedom:
-            raise TaskError(
-                f"task '{job.task.name}' has goals with freedom, but motions lead to goals of a "
-                "single pose. Leave 'free' out of the task to plan."
-            )
-        velocity, acceleration = job.spec.robot.arm_rates()
+            free = [goal.free is not None for goal in job.task.goals]
+            poses = FreeGoalPoses(build_problem(lowered.arrays), lowered.grid, free)
         if job.task.keep_out:
             lowered = with_keep_out(lowered, job.task)
         return cls(
@@ -107,9 +114,10 @@ class StopGrid:
             configurations=grid,
             lowered=lowered,
             problem=build_problem(lowered.arrays),
-            rests=np.array(list(job.spec.robot.rest_postures().values())),
-            velocity=np.array(velocity),
-            acceleration=np.array(acceleration),
+            rests=in_chain(np.array(list(job.spec.robot.rest_postures().values()))),
+            velocity=velocity,
+            acceleration=acceleration,
+            poses=poses,
         )
 
     def with_environment(self, lowered: LoweredScene) -> StopGrid:
@@ -238,6 +246,17 @@ class Stop:
         return rests[0] if len(rests) == 1 else next(free, rests[0])
 
     @property
+    def is_sampled(self) -> bool:
+        """Whether more angles of a free joint give more postures of the arm at a goal."""
+        problem = self.grid.problem
+        return problem.joints == CHAIN and not is_outside(problem.arm)
+
+    @property
+    def joints(self) -> int:
+        """Number of joints of the arm."""
+        return self.grid.problem.joints
+
+    @property
     def velocity(self) -> FloatArray:
         """Velocity limits [rad/s], shape (7,)."""
         return self.grid.velocity
@@ -253,9 +272,16 @@ class Stop:
         return self.grid.configurations.configuration(self.number)
 
     def goal_in_arm_base(self, goal: int) -> tuple[FloatArray, FloatArray]:
-        """Return the pose of a goal in the arm base A: orientation (3, 3), position (3,) [m]."""
+        """Return the pose of a goal in the arm base A: orientation (3, 3), position (3,) [m].
+
+        Of a free goal it is the pose at which scoring reaches it.
+        """
         row = rows_at(self.grid.lowered.grid, [self.number])
-        return goal_from_arm_base(self.problem, row, goal)
+        R_AG, p_AG = goal_from_arm_base(self.problem, row, goal)
+        if self.grid.poses is None:
+            return R_AG, p_AG
+        R_GT, p_GT = self.grid.poses.at(self.number)[goal]
+        return R_AG @ R_GT, p_AG + R_AG @ p_GT
 
     def place(self, values: dict[str, float]) -> None:
         """Set the live scene to this stop, the arm to its rest posture.

@@ -14,7 +14,9 @@ import numpy as np
 from tcs.errors import StoreFormatError, TcsError, one_line
 from tcs.files.reading import read_text
 from tcs.kernel.arrays import FloatArray
+from tcs.kernel.freedom.forms import FEWEST_JOINTS
 from tcs.model.grid import InitialConfiguration
+from tcs.motion.curves import CHAIN
 from tcs.motion.motion_plan import INTERPOLATION, GoalResult, MotionPlan, Segment, StopPlan
 from tcs.motion.timing import Timed
 
@@ -58,8 +60,8 @@ def load_plan(path: str | os.PathLike[str]) -> MotionPlan:
 def _plan(plain: Mapping[str, Any]) -> MotionPlan:
     joints = tuple(str(name) for name in plain["joints"])
     made_from = plain["made_from"]
-    if not isinstance(made_from, dict) or len(joints) != 7:
-        raise ValueError("'made_from' must be a mapping and 'joints' seven names")
+    if not isinstance(made_from, dict) or not FEWEST_JOINTS <= len(joints) <= CHAIN:
+        raise ValueError("'made_from' must be a mapping and 'joints' five to seven names")
     # Plans were without it at first.
     if plain.get("interpolation", INTERPOLATION) != INTERPOLATION:
         raise ValueError(f"'interpolation' must be '{INTERPOLATION}'")
@@ -67,26 +69,26 @@ def _plan(plain: Mapping[str, Any]) -> MotionPlan:
     return MotionPlan(
         made_from=made_from,
         joints=joints,
-        stops=tuple(_stop(stop) for stop in plain["stops"]),
+        stops=tuple(_stop(stop, len(joints)) for stop in plain["stops"]),
         results=tuple(_result(result) for result in plain["results"]),
         edges=_integer(verified["edges"]),
         false=_integer(verified["false"]),
         seed=_integer(plain["seed"]),
         seconds=_number(plain["seconds"]),
-        jerk_limits=_jerk_limits(plain.get("jerk_limits")),
+        jerk_limits=_jerk_limits(plain.get("jerk_limits"), len(joints)),
     )
 
 
-def _jerk_limits(plain: Any) -> tuple[float, ...] | None:
+def _jerk_limits(plain: Any, joints: int) -> tuple[float, ...] | None:
     if plain is None:
         return None
     limits = tuple(math.inf if limit is None else _number(limit) for limit in plain)
-    if len(limits) != 7 or min(limits) <= 0.0:
-        raise ValueError("'jerk_limits' must be null or seven numbers above 0, or null")
+    if len(limits) != joints or min(limits) <= 0.0:
+        raise ValueError("'jerk_limits' must be null or a number above 0, or null, for each joint")
     return limits
 
 
-def _stop(plain: Mapping[str, Any]) -> StopPlan:
+def _stop(plain: Mapping[str, Any], joints: int) -> StopPlan:
     axes = [name for name in plain if name not in _STOP]
     angles = [name.endswith("_deg") for name in axes]
     values = [_number(plain[name]) for name in axes]
@@ -104,19 +106,21 @@ def _stop(plain: Mapping[str, Any]) -> StopPlan:
     return StopPlan(
         at=at,
         index=None if plain["configuration"] is None else _integer(plain["configuration"]),
-        segments=tuple(_segment(segment) for segment in plain["segments"]),
+        segments=tuple(_segment(segment, joints) for segment in plain["segments"]),
         returns=bool(plain["returns"]),
     )
 
 
-def _segment(plain: Mapping[str, Any]) -> Segment:
+def _segment(plain: Mapping[str, Any], joints: int) -> Segment:
     if plain["type"] not in SEGMENT_TYPES:
         raise ValueError(f"'type' must be one of {', '.join(SEGMENT_TYPES)}")
     times = _array(plain["times"], 1)
     positions, velocities = _array(plain["positions"], 2), _array(plain["velocities"], 2)
-    shape = (len(times), 7)
+    shape = (len(times), joints)
     if len(times) < 2 or positions.shape != shape or velocities.shape != shape:
-        raise ValueError("a segment must have seven positions and velocities for each of its times")
+        raise ValueError(
+            "a segment must have positions and velocities of all joints for each of its times"
+        )
     if times[0] != 0.0 or not np.all(np.diff(times) >= _LEAST_STEP):
         raise ValueError("the times of a segment must ascend from 0")
     start, end = (None if plain[key] == "rest" else _integer(plain[key]) for key in ("from", "to"))

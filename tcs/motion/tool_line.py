@@ -30,12 +30,16 @@ def tool_slowing(scene: MotionScene, motion: Curve) -> float:
     q, dq = _samples(motion, np.sqrt(third / (8.0 * missed)))
     _, p, axes, origins = _tool(scene, q)
     arms = np.cross(axes, p[:, None] - origins)
+    sliding = scene.slides > 0.0
+    arms[:, sliding] = scene.slides[sliding, None] * axes[:, sliding]
     speed = np.linalg.norm(np.einsum("nk,nkr->nr", dq, arms), axis=1)
     return float(np.max(speed) + missed) / TOOL_SPEED
 
 
 def is_straight(scene: MotionScene, motion: Curve) -> bool:
     """Return whether the tool moves along a line at constant orientation, within OFF_LINE.
+
+    Only `scene.turn` keeps its direction if the tool is free to rotate about it.
 
     Args:
         scene: The arm.
@@ -49,6 +53,8 @@ def is_straight(scene: MotionScene, motion: Curve) -> bool:
     from_begin = p - p[0]
     off = np.linalg.norm(from_begin - np.outer(from_begin @ line, line), axis=1)
     turned = np.linalg.norm(R - R[0], axis=(1, 2)) / np.sqrt(2.0)
+    if np.any(scene.turn):
+        turned = np.linalg.norm((R - R[0]) @ scene.turn, axis=1)
     return bool(max(np.max(off), np.max(turned)) + missed <= OFF_LINE)
 
 
@@ -71,7 +77,8 @@ def _greatest_derivatives(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return bounds on derivatives of the tool's pose on each piece of a motion, shapes (n,).
 
-    The derivative of the tool's position by joints up to k is at most its distance from axis k.
+    The derivative of the tool's position by joints up to k is at most its distance from axis k. A
+    prismatic joint moves it no more than a rotation of a link as long as the joint ever extends.
 
     Args:
         scene: The arm.
@@ -82,7 +89,12 @@ def _greatest_derivatives(
         orientation, as rotation vectors [rad/s^2].
     """
     velocity, acceleration, jerk = rates(motion)
-    links = np.linalg.norm(scene.chain_p[1:], axis=1)
+    links = np.linalg.norm(scene.chain_p[1:, :3], axis=1)
+    sliding = scene.slides > 0.0
+    farthest = np.maximum(np.abs(scene.lower), np.abs(scene.upper))[sliding]
+    links[sliding] += scene.slides[sliding] * farthest
+    for rate in (velocity, acceleration, jerk):
+        rate[:, sliding] /= farthest
     # From the origin of each joint to the tool with the arm stretched.
     far = np.cumsum(links[::-1])[::-1]
     v, a = np.cumsum(velocity, axis=1), np.cumsum(acceleration, axis=1)
@@ -112,12 +124,15 @@ def _tool(
     R, p = np.repeat(np.eye(3)[None], len(q), axis=0), np.zeros((len(q), 3))
     axes, origins = np.empty((len(q), 7, 3)), np.empty((len(q), 7, 3))
     for k in range(7):
-        p = p + R @ scene.chain_p[k]
+        p = p + R @ scene.chain_p[k, :3]
         R = R @ scene.chain_R[k]
         axes[:, k], origins[:, k] = R[:, :, 2], p
+        if scene.slides[k] > 0.0:
+            p = p + scene.slides[k] * q[:, k, None] * R[:, :, 2]
+            continue
         turn = np.zeros((len(q), 3, 3))
         c, s = np.cos(q[:, k]), np.sin(q[:, k])
         turn[:, 0, 0], turn[:, 0, 1], turn[:, 1, 0], turn[:, 1, 1] = c, -s, s, c
         turn[:, 2, 2] = 1.0
         R = R @ turn
-    return R @ scene.chain_R[7], p + R @ scene.chain_p[7], axes, origins
+    return R @ scene.chain_R[7], p + R @ scene.chain_p[7, :3], axes, origins

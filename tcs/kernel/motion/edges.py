@@ -325,7 +325,7 @@ def _take_piece(scene: MotionScene, work: MotionWorkspace, begin: float, end: fl
     """Make the middle of a piece the current posture, with the motion of the links on the piece."""
     take_middle(work, begin, end)
     take_posture(scene, work)
-    take_twists(work, 0.5 * (end - begin))
+    take_twists(scene, work, 0.5 * (end - begin))
 
 
 @inner

@@ -16,7 +16,7 @@ from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.collide import BOUND, CENTRE
 from tcs.kernel.motion.box_tree import NONE, Groups, boxes_around
 from tcs.kernel.motion.pair_tree import PairTree, pair_tree
-from tcs.kernel.motion.scene import NO_PAIR, MotionScene, pair_fields
+from tcs.kernel.motion.scene import NO_PAIR, MotionScene, depth, pair_fields
 
 
 def grouped(scene: MotionScene, carrier: IntArray | None = None) -> MotionScene:
@@ -37,7 +37,7 @@ def grouped(scene: MotionScene, carrier: IntArray | None = None) -> MotionScene:
     gap = np.zeros((count, len(arm.rows) + shapes))
     gap[scene.pair[:, 0], scene.pair[:, 1] + added * (scene.pair[:, 1] >= count)] = scene.gap
     frame = np.concatenate([arm.frame, np.zeros(len(around.rows), np.int64)])
-    tree, roots = _pairs(arm, around, frame, gap)
+    tree, roots = _pairs(arm, around, depth(frame, scene.coupled), gap)
     first, second = tree.first, tree.second
     fields = pair_fields(
         arm.rows,
@@ -110,13 +110,13 @@ def _bodies(groups: Groups, body: IntArray) -> IntArray:
     return np.concatenate([body, body[np.array(of_boxes, np.int64)]])
 
 
-def _pairs(arm: Groups, around: Groups, frame: IntArray, gap: FloatArray) -> tuple[PairTree, int]:
+def _pairs(arm: Groups, around: Groups, away: FloatArray, gap: FloatArray) -> tuple[PairTree, int]:
     """Return the tree of pairs on different links or with fixed shapes, and how many are its roots.
 
     Args:
         arm: Shapes and boxes of the arm.
         around: Fixed shapes and boxes, numbered after those of the arm.
-        frame: Link of all of them, 0 of those that are fixed.
+        away: Depth of the link of all of them, 0 of those that are fixed.
         gap: As for `pair_tree`.
     """
     count = len(arm.rows)
@@ -126,5 +126,5 @@ def _pairs(arm: Groups, around: Groups, frame: IntArray, gap: FloatArray) -> tup
     first, second = (
         part.ravel() for part in np.meshgrid(np.sort(arm.roots), others, indexing="ij")
     )
-    apart = frame[first] > frame[second]
+    apart = away[first] > away[second]
     return pair_tree(first[apart], second[apart], parts, bound, gap)

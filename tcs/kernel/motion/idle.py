@@ -3,7 +3,8 @@
 First, boxes take the place of the shapes beyond the last joint between: they enclose some of these
 shapes whatever its angle. The ranges of the one or two joints that remain are divided into parts
 until each part is certified. Pairs with two joints between that this does not decide are checked in
-the same way by themselves.
+the same way by themselves, and so are those whose last joint is prismatic. Pairs with links between
+coupled joints stay.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from tcs.kernel.collide import CENTRE, ROTATION, SIZE, TYPE
 from tcs.kernel.motion.box_tree import NONE, boxes_between, extents
 from tcs.kernel.motion.pairs import is_near, take_posture
 from tcs.kernel.motion.scene import (
+    FRAMES,
     MotionScene,
     MotionWorkspace,
     moved_shapes,
@@ -51,10 +53,13 @@ def needed_pairs(scene: MotionScene, checked: BoolArray) -> BoolArray:
         checked: Which pairs may be left out, shape (n_pairs,).
     """
     needed = np.ones(len(scene.pair), np.bool_)
-    between = scene.link_frame[scene.pair[:, 0]] - scene.pair[:, 2]
+    frame, base = scene.link_frame[scene.pair[:, 0]], scene.pair[:, 2]
+    between = frame - base
+    checked = checked & (frame < FRAMES) & (base < FRAMES)
     which = np.flatnonzero(checked & (between <= MOST_BETWEEN))
-    if which.size:
-        needed[which] = _needed_at_any_angle(scene, which)
+    turned = which[scene.slides[frame[which] - 1] == 0.0]
+    if turned.size:
+        needed[turned] = _needed_at_any_angle(scene, turned)
     which = which[needed[which] & (between[which] <= DIVIDED)]
     if which.size:
         needed[which] = _needed(with_pairs(scene, which))
@@ -127,7 +132,7 @@ def _boxes_at_any_angle(scene: MotionScene, members: IntArray) -> _Boxes:
     begin = np.flatnonzero(place % IN_BOX == 0)
     rows, link = _turned_boxes(scene.links[members], begin), scene.link_frame[members[begin]] - 1
     for f in np.unique(link):
-        rows[link == f] = moved_shapes(rows[link == f], scene.chain_R[f], scene.chain_p[f])
+        rows[link == f] = moved_shapes(rows[link == f], scene.chain_R[f], scene.chain_p[f, :3])
     of_shape = np.full(len(scene.links), NONE)
     of_shape[members] = np.repeat(np.arange(len(begin)), np.diff(np.append(begin, len(members))))
     return _Boxes(rows, link, scene.body[members[begin]], of_shape)

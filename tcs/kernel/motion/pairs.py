@@ -4,7 +4,8 @@ A pair may touch on a piece if it is closer, at the middle posture, than its gap
 far its shapes move on the piece.
 
 The bound: with the joints changed one after the other, from the last to the first, a point at
-distance d from the axis of joint k moves by at most `delta_k d` when that joint turns; and its
+distance d from the axis of joint k moves by at most `delta_k d` when that joint turns, or by
+`delta_k` if it is prismatic; and its
 distance from the axis has grown by no more than the motion before (Schwarzer, Saha, Latombe 2005
 bound the motion of all postures at once, which is looser). Where the twist of the link at the
 middle posture is known, and what it leaves, `planes`, the motion from there is bounded by their sum
@@ -22,8 +23,8 @@ from tcs.kernel.collide import BOUND, CENTRE, ROTATION, SIZE, TYPE, closer, move
 from tcs.kernel.distances import distance_bound
 from tcs.kernel.motion.link_poses import place_links, place_turned
 from tcs.kernel.motion.planes import TWISTED, plane_between
-from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
-from tcs.kernel.motion.tool_line import SEEN_FROM_TOOL, follows_line, line_motion, off_line
+from tcs.kernel.motion.scene import FRAMES, SEEN_FROM_TOOL, MotionScene, MotionWorkspace
+from tcs.kernel.motion.tool_line import follows_line, line_motion, off_line
 
 COARSE = 0.02
 """Motion [m] above which bounding spheres alone decide whether a pair may meet on a piece: the
@@ -45,7 +46,7 @@ def place_shape(scene: MotionScene, work: MotionWorkspace, i: int) -> None:
     frame, shapes = scene.link_frame[i], work.shapes
     move(work.link_R[frame], work.link_p[frame], scene.links, i, shapes, i)
     if work.posture[1] == 0:
-        for k in range(frame + 1):
+        for k in range(_columns(scene, frame)):
             work.motion[i, k] = 0.0
         return
     root = scene.root[i]
@@ -53,6 +54,13 @@ def place_shape(scene: MotionScene, work: MotionWorkspace, i: int) -> None:
         _bound_motion_in_box(scene, work, i, root)
     else:
         _bound_motion(scene, work, i)
+
+
+@inner
+def _columns(scene: MotionScene, frame: int) -> int:
+    """Return the number of columns of `motion` and `rest` that hold for a shape on a link."""
+    coupled = len(scene.coupled)
+    return frame + 1 if coupled == 0 else FRAMES + coupled
 
 
 @inner
@@ -69,7 +77,7 @@ def _bound_motion_in_box(scene: MotionScene, work: MotionWorkspace, i: int, root
         move(work.link_R[frame], work.link_p[frame], scene.links, root, work.shapes, root)
         _bound_motion(scene, work, root)
     frame = scene.link_frame[i]
-    for k in range(frame + 1):
+    for k in range(_columns(scene, frame)):
         work.motion[i, k], work.rest[i, k] = work.motion[root, k], work.rest[root, k]
     work.by_tool[i] = work.by_tool[root]
     twist = work.turn if work.by_tool[i] else work.twist
@@ -84,21 +92,58 @@ def _bound_motion(scene: MotionScene, work: MotionWorkspace, i: int) -> None:
     frame = scene.link_frame[i]
     total = second = 0.0
     work.motion[i, frame] = work.rest[i, frame] = 0.0
-    for k in range(frame, 0, -1):
+    last, part = frame, 1.0
+    if frame >= FRAMES:
+        last, part = int(scene.coupled[frame - FRAMES, 0]) + 1, scene.coupled[frame - FRAMES, 1]
+    for k in range(last, 0, -1):
+        if len(scene.coupled) > 0:
+            _bound_between(scene, work, i, k, part, total, second)
         if work.delta[k - 1] > 0.0:
-            total, second = _with_joint(work, i, k, total, second)
+            slide = part * scene.slides[k - 1]
+            total, second = _with_joint(work, i, k, slide, total, second)
         work.motion[i, k - 1], work.rest[i, k - 1] = total, 0.5 * second
+        part = 1.0
     work.by_tool[i] = False
     if work.posture[1] == TWISTED:
-        if frame >= SEEN_FROM_TOOL and follows_line(work):
-            _bound_motion_by_tool(work, i, frame)
+        if SEEN_FROM_TOOL <= frame < FRAMES and follows_line(work):
+            _bound_motion_by_tool(scene, work, i, frame)
         twist = work.turn if work.by_tool[i] else work.twist
         moved = _motion_of_twist(work, i, twist[frame]) + work.rest[i, 0]
         work.motion[i, 0] = min(work.motion[i, 0], moved)
 
 
 @inner
-def _bound_motion_by_tool(work: MotionWorkspace, i: int, frame: int) -> None:
+def _bound_between(
+    scene: MotionScene,
+    work: MotionWorkspace,
+    i: int,
+    k: int,
+    part: float,
+    total: float,
+    second: float,
+) -> None:
+    """Fill the rows of `motion` and `rest` of shape i relative to links between coupled joints.
+
+    Args:
+        scene: The scene.
+        work: Scratch.
+        i: The shape.
+        k: The joint, 1 .. 7, that the links are between.
+        part: Fraction of the motion of that joint that the shape makes.
+        total: As for `_with_joint`.
+        second: As for `_with_joint`.
+    """
+    for n in range(len(scene.coupled)):
+        if int(scene.coupled[n, 0]) == k - 1 and scene.coupled[n, 1] < part:
+            slide = (part - scene.coupled[n, 1]) * scene.slides[k - 1]
+            moved = slide * work.delta[k - 1] * GROWN
+            bend = slide * work.bend[k - 1] * GROWN
+            work.motion[i, FRAMES + n] = total + moved
+            work.rest[i, FRAMES + n] = 0.5 * (second + bend)
+
+
+@inner
+def _bound_motion_by_tool(scene: MotionScene, work: MotionWorkspace, i: int, frame: int) -> None:
     """Bound the motion of shape i on link `frame` by the joints between it and the tool.
 
     The tool follows a line, so these joints alone decide how far the shape is from where `turn`
@@ -108,7 +153,7 @@ def _bound_motion_by_tool(work: MotionWorkspace, i: int, frame: int) -> None:
     total = second = 0.0
     for k in range(frame + 1, 8):
         if work.delta[k - 1] > 0.0:
-            total, second = _with_joint(work, i, k, total, second)
+            total, second = _with_joint(work, i, k, scene.slides[k - 1], total, second)
     off = off_line(work, total)
     if 0.5 * second + off < work.rest[i, 0]:
         work.by_tool[i], work.rest[i, 0] = True, 0.5 * second + off
@@ -117,7 +162,7 @@ def _bound_motion_by_tool(work: MotionWorkspace, i: int, frame: int) -> None:
 
 @inner
 def _with_joint(
-    work: MotionWorkspace, i: int, k: int, total: float, second: float
+    work: MotionWorkspace, i: int, k: int, slide: float, total: float, second: float
 ) -> tuple[float, float]:
     """Return how far a point of shape i moves on the piece if joint k moves too [m].
 
@@ -125,6 +170,7 @@ def _with_joint(
         work: Scratch; shape i is placed.
         i: The shape.
         k: The joint, 1 .. 7, the next one on the way from the shape to the base, or to the tool.
+        slide: Motion of the shape per unit of a prismatic joint [m/m], 0 for a revolute one.
         total: Bound on the motion by the joints between.
         second: Bound on their terms of the second derivative.
 
@@ -132,6 +178,9 @@ def _with_joint(
         `total` and `second` with joint k.
     """
     shapes, angle = work.shapes, work.delta[k - 1]
+    if slide > 0.0:
+        # It moves all points alike, whatever the joints between do.
+        return total + slide * angle * GROWN, second + slide * work.bend[k - 1] * GROWN
     R, p = work.link_R[k], work.link_p[k]
     dx, dy, dz = (
         shapes[i, CENTRE] - p[0],
@@ -211,6 +260,14 @@ def take_posture(scene: MotionScene, work: MotionWorkspace) -> None:
         if work.delta[k] > 0.0:
             work.posture[1] = 1
     place_links(scene.chain_R, scene.chain_p, work.q, work.turns, work.link_R, work.link_p)
+    for n in range(len(scene.coupled)):
+        k = int(scene.coupled[n, 0])
+        R, p = work.link_R[k + 1], work.link_p[k + 1]
+        behind = (1.0 - scene.coupled[n, 1]) * scene.slides[k] * work.q[k]
+        for r in range(3):
+            for c in range(3):
+                work.link_R[FRAMES + n, r, c] = R[r, c]
+            work.link_p[FRAMES + n, r] = p[r] - behind * R[r, 2]
 
 
 @inner

@@ -27,7 +27,7 @@ from tcs.kernel.collide import (
     between_box_and_segment,
     between_segments,
 )
-from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
+from tcs.kernel.motion.scene import FRAMES, MotionScene, MotionWorkspace
 from tcs.kernel.motion.tool_line import follows_line, take_turns
 
 TWISTED = 2
@@ -54,13 +54,14 @@ class RelativeMotion(NamedTuple):
 
 
 @inner
-def take_twists(work: MotionWorkspace, half: float) -> None:
+def take_twists(scene: MotionScene, work: MotionWorkspace, half: float) -> None:
     """Fill the motion of each link on the piece, to first order, from `work.rate`.
 
     A point at r of link f moves by `w x r + v` until the end of the piece, and by as much backwards
     until its begin; w and v are the first and the last three of row f of `work.twist`.
 
     Args:
+        scene: The scene.
         work: `twist` is filled, and `turn` where the tool follows a line.
         half: Half of the length of the piece, as a fraction of the curve.
     """
@@ -71,6 +72,11 @@ def take_twists(work: MotionWorkspace, half: float) -> None:
         twist[0, m] = 0.0
     for k in range(7):
         R, p, rate = work.link_R[k + 1], work.link_p[k + 1], work.rate[k]
+        if scene.slides[k] > 0.0:
+            for r in range(3):
+                twist[k + 1, r] = twist[k, r]
+                twist[k + 1, 3 + r] = twist[k, 3 + r] + scene.slides[k] * rate * R[r, 2]
+            continue
         x, y, z = rate * R[0, 2], rate * R[1, 2], rate * R[2, 2]
         twist[k + 1, 0], twist[k + 1, 1], twist[k + 1, 2] = (
             twist[k, 0] + x,
@@ -80,8 +86,12 @@ def take_twists(work: MotionWorkspace, half: float) -> None:
         twist[k + 1, 3] = twist[k, 3] - (y * p[2] - z * p[1])
         twist[k + 1, 4] = twist[k, 4] - (z * p[0] - x * p[2])
         twist[k + 1, 5] = twist[k, 5] - (x * p[1] - y * p[0])
+    for n in range(len(scene.coupled)):
+        k, part = int(scene.coupled[n, 0]), scene.coupled[n, 1]
+        for m in range(6):
+            twist[FRAMES + n, m] = twist[k, m] + part * (twist[k + 1, m] - twist[k, m])
     if follows_line(work):
-        take_turns(work, half)
+        take_turns(scene, work, half)
 
 
 @inner

@@ -6,11 +6,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
+from tcs.kernel.arrays import BoolArray, Chain, FloatArray, IntArray
 from tcs.kernel.collide import BOUND, CENTRE, COLUMNS, ROTATION
 from tcs.kernel.distances import DistanceTables
 from tcs.kernel.motion.link_poses import LANES
-from tcs.kernel.problem import Problem
+from tcs.kernel.problem import Problem, travel
 from tcs.kernel.rows import Rows
 
 FULL_TURN = 2.0 * np.pi
@@ -27,32 +27,48 @@ WIDE = 256
 """Greatest number of pieces of a curve that are certified level by level."""
 LISTED = 8192
 """Greatest number of pairs that are listed for all of them: depth first, lists take less."""
+FRAMES = 8
+"""Number of the first link between coupled joints: those of the arm's joints are 1 .. 7."""
+SEEN_FROM_TOOL = 4
+"""First link whose motion is bounded by the joints between it and the tool too: no more joints are
+on that side than on the other."""
 
 
 class MotionScene(NamedTuple):
     """One arm among fixed shapes. Frames as in `tcs.kernel.arrays`.
 
     Shapes are numbered: those of the arm first, in the order of `links`, then those of `fixed`.
+    There are always seven joints: the first ones, which an arm of fewer lacks, remain at 0.
+    Positions of prismatic joints are in [m] where [rad] is written.
     """
 
     chain_R: FloatArray
     """Rotations of the chain, shape (8, 3, 3)."""
     chain_p: FloatArray
-    """Translations of the chain [m], shape (8, 3)."""
+    """Translations of the chain [m], shape (8, 3); with a fourth column that holds `slides` if
+    there are prismatic joints."""
+    slides: FloatArray
+    """Motion of each prismatic joint per unit [m/m], 0 for a revolute joint, shape (7,)."""
+    coupled: FloatArray
+    """Links between coupled joints, as in `Chain`, numbered from FRAMES on, shape (n, 2)."""
     lower: FloatArray
-    """Lower joint limits [rad], shape (7,); -inf where continuous."""
+    """Lower joint limits [rad], shape (7,); -inf where continuous, 0 for one that remains at 0."""
     upper: FloatArray
-    """Upper joint limits [rad], shape (7,); +inf where continuous."""
+    """Upper joint limits [rad], shape (7,); +inf where continuous, 0 for one that remains at 0."""
     period: FloatArray
     """A full turn for each continuous joint, 0 for the others [rad], shape (7,)."""
     reach: FloatArray
-    """Bound on how far any point of the arm may be from the axis of each joint [m], shape (7,)."""
+    """Bound on how far any point of the arm moves per unit of each joint: for a revolute one, how
+    far it may be from the axis [m]; shape (7,)."""
     weight: FloatArray
     """Square of `reach` relative to its largest, shape (7,)."""
+    aside: float
+    """Bound on how far any point of the last links, from SEEN_FROM_TOOL on, may be from the origin
+    of the first of them [m]."""
     links: FloatArray
     """The arm's shapes, packed, in link frames, shape (n_arm, 17)."""
     link_frame: IntArray
-    """Link of each shape in `links`, 1 .. 7, shape (n_arm,)."""
+    """Link of each shape in `links`, 1 .. 7 or one between coupled joints, shape (n_arm,)."""
     fixed: FloatArray
     """Environment and rest of the robot, and boxes around groups of the latter, packed, in A, shape
     (n_fixed, 17)."""
@@ -101,6 +117,9 @@ class MotionScene(NamedTuple):
     (n_arm,)."""
     robot: int
     """Number of the first body of the robot in `body`."""
+    turn: FloatArray
+    """As in `Problem`: the axis about which straight motions may rotate the tool of an arm of five
+    joints, in T, else zeros, shape (3,)."""
 
 
 class MotionWorkspace(NamedTuple):
@@ -111,9 +130,11 @@ class MotionWorkspace(NamedTuple):
     turns: FloatArray
     """Scratch of `place_links`, shape (3, LANES)."""
     link_R: FloatArray
-    """Orientations of A, L1..L7 in A, shape (8, 3, 3)."""
+    """Orientations of A, L1..L7 and the links between coupled joints in A, shape
+    (8 + coupled, 3, 3)."""
     link_p: FloatArray
-    """Origins of A, L1..L7 in A [m], shape (8, 3)."""
+    """Origins of A, L1..L7 and the links between coupled joints in A [m], shape
+    (8 + coupled, 3)."""
     shapes: FloatArray
     """All shapes in A at the current posture, packed, shape (n_arm + n_fixed, 17)."""
     placed: IntArray
@@ -126,20 +147,22 @@ class MotionWorkspace(NamedTuple):
     shape (7,)."""
     motion: FloatArray
     """Bound on how far any point of a shape moves on the current piece, relative to each link
-    0 .. 7 before its own [m], shape (n_arm, 8)."""
+    before its own [m], shape (n_arm, 8 + coupled)."""
     rest: FloatArray
     """Bound on how far any point of a shape is on the current piece from where its twist at the
-    middle posture leads to, relative to each link 0 .. 7 before its own [m], shape (n_arm, 8)."""
+    middle posture leads to, relative to each link before its own [m], shape (n_arm, 8 + coupled).
+    """
     rate: FloatArray
     """Motion of each joint on half of the current piece, to first order [rad], shape (7,)."""
     bend: FloatArray
     """Bound on twice the motion of each joint beyond the first order [rad], shape (7,)."""
     twist: FloatArray
-    """Motion of the links 0 .. 7 on half of the current piece, see `planes`, shape (8, 6)."""
+    """Motion of the links on half of the current piece, see `planes`, shape (8 + coupled, 6)."""
     line: FloatArray
     """Straight motion of the tool on the current curve, see `tool_line`, shape (5,)."""
     turn: FloatArray
-    """Motion of the links as `twist`, but as seen from the tool on that line, shape (8, 6)."""
+    """Motion of the links 0 .. 7 as `twist`, but as seen from the tool on that line, shape
+    (8, 6)."""
     by_tool: BoolArray
     """Whether the first row of `rest` bounds what `turn` leaves, not `twist`, shape (n_arm,)."""
     control: FloatArray
@@ -204,23 +227,29 @@ def torso_scene(problem: Problem, torso: int) -> MotionScene:
     )
     links = np.ascontiguousarray(problem.links[:count])
     link_frame = np.ascontiguousarray(problem.link_frame[:count])
-    # `links` begin at the tool, so the shape of greater index is on the link nearer to the base.
-    apart = np.triu(link_frame[:, None] != link_frame)
+    away = depth(link_frame, problem.coupled)
+    apart = away[:, None] > away
     gaps = np.concatenate([gap_fixed, problem.gap_arm[:count, :count] * apart], axis=1)
     arm, other = np.nonzero(gaps > 0.0)
     number = np.concatenate([count + np.arange(len(fixed)), np.arange(count)])
     carrying = np.concatenate([np.zeros(len(fixed), np.int64), link_frame])
     pair = np.stack([arm, number[other], carrying[other]], axis=1)
-    lower, upper = problem.arm.lower, problem.arm.upper
-    reach = _reach(problem.chain_p, links, link_frame)
+    lower, upper = problem.arm.lower.copy(), problem.arm.upper.copy()
+    lower[: 7 - problem.joints] = upper[: 7 - problem.joints] = 0.0
+    slides = problem.chain_p[:7, 3].copy() if problem.chain_p.shape[1] > 3 else np.zeros(7)
+    farthest = _farthest(problem, slides, links, link_frame)
+    reach = np.where(slides > 0.0, slides, farthest)
     return MotionScene(
         chain_R=problem.chain_R,
         chain_p=problem.chain_p,
+        slides=slides,
+        coupled=problem.coupled,
         lower=lower,
         upper=upper,
         period=np.where(np.isfinite(lower) & np.isfinite(upper), 0.0, FULL_TURN),
         reach=reach,
         weight=(reach / reach.max()) ** 2,
+        aside=float(farthest[SEEN_FROM_TOOL - 1]),
         links=links,
         link_frame=link_frame,
         fixed=fixed,
@@ -239,6 +268,7 @@ def torso_scene(problem: Problem, torso: int) -> MotionScene:
         leaf_shape=np.zeros(0, np.int64),
         leaf_pair=np.zeros((0, len(fixed)), np.int64),
         robot=problem.environment_bodies,
+        turn=problem.turn,
         **pair_fields(links, fixed, pair, gaps[arm, other]),
     )
 
@@ -331,22 +361,23 @@ def pair_fields(
 def new_motion_workspace(scene: MotionScene) -> MotionWorkspace:
     """Return scratch memory for one worker."""
     arm, pairs, bodies = len(scene.links), len(scene.pair), int(scene.body.max()) + 1
+    frames = FRAMES + len(scene.coupled)
     shapes = np.zeros((arm + len(scene.fixed), COLUMNS))
     shapes[arm:] = scene.fixed
     return MotionWorkspace(
         q=np.empty(7),
         turns=np.zeros((3, LANES)),
-        link_R=np.empty((8, 3, 3)),
-        link_p=np.empty((8, 3)),
+        link_R=np.empty((frames, 3, 3)),
+        link_p=np.empty((frames, 3)),
         shapes=shapes,
         placed=np.zeros(arm, np.int64),
         posture=np.zeros(2, np.int64),
         delta=np.zeros(7),
-        motion=np.zeros((arm, 8)),
-        rest=np.zeros((arm, 8)),
+        motion=np.zeros((arm, frames)),
+        rest=np.zeros((arm, frames)),
         rate=np.zeros(7),
         bend=np.zeros(7),
-        twist=np.zeros((8, 6)),
+        twist=np.zeros((frames, 6)),
         line=np.array([0.0, 0.0, 0.0, np.inf, 0.0]),
         turn=np.zeros((8, 6)),
         by_tool=np.zeros(arm, np.bool_),
@@ -388,17 +419,29 @@ def _centres(pair: IntArray, links: int, fixed: FloatArray) -> FloatArray:
     return centre.take(pair[:, 1], axis=1)
 
 
-def _reach(chain_p: FloatArray, links: FloatArray, link_frame: IntArray) -> FloatArray:
-    """Return a bound on the distance of any point of the arm from each axis [m], shape (7,)."""
-    out = [_reach_from(k + 1, chain_p, links, link_frame).max(initial=0.0) for k in range(7)]
-    return np.array(out)
+def depth(frame: IntArray, coupled: FloatArray) -> FloatArray:
+    """Return the number of joints before links; links between coupled joints are after a part.
+
+    Args:
+        frame: Numbers of the links, shape (n,).
+        coupled: As in `Chain`.
+    """
+    found: FloatArray = np.concatenate([np.arange(float(FRAMES)), coupled.sum(axis=1)])[frame]
+    return found
 
 
-def _reach_from(
-    frame: int, chain_p: FloatArray, links: FloatArray, link_frame: IntArray
+def _farthest(
+    problem: Problem, slides: FloatArray, links: FloatArray, link_frame: IntArray
 ) -> FloatArray:
-    """Return a bound on the distance of each shape from the origin of a link, 0 if it is before."""
-    spans = np.concatenate([[0.0], np.cumsum(np.linalg.norm(chain_p[:7], axis=1))])
+    """Return how far from the origin of each link any point on or beyond it may be [m], (7,)."""
+    arm, p = problem.arm, problem.chain_p[:, :3]
+    steps = np.linalg.norm(p[:7], axis=1)
+    steps += travel(Chain(problem.chain_R, p, arm.lower, arm.upper, slides=slides))
+    spans = np.concatenate([[0.0], np.cumsum(steps)])
+    spans = np.append(spans, spans[problem.coupled[:, 0].astype(np.int64) + 1])
     centre = np.linalg.norm(links[:, CENTRE : CENTRE + 3], axis=1)
-    out = spans[link_frame] - spans[frame] + centre + links[:, BOUND]
-    return np.where(link_frame >= frame, out, 0.0)
+    away, found = depth(link_frame, problem.coupled), np.zeros(7)
+    for k in range(1, 8):
+        out = spans[link_frame] - spans[k] + centre + links[:, BOUND]
+        found[k - 1] = np.max(np.where(away >= k, out, 0.0), initial=0.0)
+    return found

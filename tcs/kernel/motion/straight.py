@@ -8,10 +8,11 @@ import numpy as np
 
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant, jit
-from tcs.kernel.kinematics import fill_jacobian, place_tool, pose_error
+from tcs.kernel.kinematics import fill_jacobian, fill_sliding, place_tool, pose_error
 from tcs.kernel.motion.edges import curve_is_free, posture_is_free
 from tcs.kernel.motion.link_poses import LANES, place_links
 from tcs.kernel.motion.scene import MOST_PIECES, MotionScene, MotionWorkspace
+from tcs.kernel.motion.tool_line import may_turn
 from tcs.kernel.numeric.newton import (
     NewtonWorkspace,
     factorise,
@@ -35,7 +36,7 @@ OFF_LINE = 5e-4
 singularities, and where a joint arrives at its limit."""
 ONE = int_constant(1)
 MOST_LOCKED = 1
-"""Number of joints that may rest at a limit: a pose takes six."""
+"""Number of joints that may rest, at a limit or because the arm lacks them: a pose takes six."""
 
 
 class StraightWorkspace(NamedTuple):
@@ -52,7 +53,8 @@ class StraightWorkspace(NamedTuple):
     target: FloatArray
     """Next position of the tool in A [m], shape (3,)."""
     locked: IntArray
-    """1 for each joint that rests at a limit, shape (7,)."""
+    """1 for each joint that rests at a limit, or that the arm lacks, shape (7,). The first one of
+    an arm of five joints stands for the rotation of its tool that is free."""
     q: FloatArray
     """Trial posture [rad], shape (7,)."""
 
@@ -176,7 +178,7 @@ def _lead(
     place_links(scene.chain_R, scene.chain_p, q, line.turns, newton.link_R, newton.link_p)
     place_tool(scene.chain_R, scene.chain_p, newton.link_R, newton.link_p, line.R_AT, line.p_AT)
     for k in range(7):
-        points[0, k], line.locked[k] = q[k], 0
+        points[0, k], line.locked[k] = q[k], _never_moves(scene, k)
     for n in range(last + 1):
         if n > 0 and not next_on_line(scene, line, offset, n / last, points[n - 1], points[n]):
             return LIMITS
@@ -187,7 +189,7 @@ def _lead(
                 return LIMITS
     keep_within_limits(scene, points, tangents)
     for k in range(7):
-        line.locked[k] = 0
+        line.locked[k] = _never_moves(scene, k)
     for n in range(last):
         take_piece(work, points, tangents, n)
         if error_between(scene, work, line, offset, (n + 0.5) / last) > OFF_LINE:
@@ -202,6 +204,13 @@ def _lead(
             return BLOCKED
         first += count
     return DONE
+
+
+@inner
+def _never_moves(scene: MotionScene, k: int) -> int:
+    """Return 1 if joint k is one that the arm lacks, and does not stand for another, else 0."""
+    is_turn = k == 0 and may_turn(scene)
+    return 1 if scene.lower[k] == scene.upper[k] and not is_turn else 0
 
 
 @inner
@@ -256,7 +265,28 @@ def _error_on_line(scene: MotionScene, line: StraightWorkspace, q: FloatArray) -
     newton = line.newton
     place_links(scene.chain_R, scene.chain_p, q, line.turns, newton.link_R, newton.link_p)
     place_tool(scene.chain_R, scene.chain_p, newton.link_R, newton.link_p, newton.R_AT, newton.p_AT)
-    return pose_error(newton.R_AT, newton.p_AT, line.R_AT, line.target, newton.error)
+    worst = pose_error(newton.R_AT, newton.p_AT, line.R_AT, line.target, newton.error)
+    return _without_turn(scene, line) if may_turn(scene) else worst
+
+
+@inner
+def _without_turn(scene: MotionScene, line: StraightWorkspace) -> float:
+    """Take the rotation about the free axis off `newton.error`; return the rest [rad and m]."""
+    error, worst, along = line.newton.error, 0.0, 0.0
+    for r in range(3):
+        along += error[r] * _turn_in_base(scene, line, r)
+    for r in range(3):
+        error[r] -= along * _turn_in_base(scene, line, r)
+    for m in range(6):
+        worst = max(worst, abs(error[m]))
+    return worst
+
+
+@inner
+def _turn_in_base(scene: MotionScene, line: StraightWorkspace, r: int) -> float:
+    """Return a component in A of the axis about which the tool is free to rotate."""
+    R, turn = line.R_AT, scene.turn
+    return R[r, 0] * turn[0] + R[r, 1] * turn[1] + R[r, 2] * turn[2]
 
 
 @inner
@@ -264,10 +294,14 @@ def evaluate_on_line(scene: MotionScene, line: StraightWorkspace, q: FloatArray)
     """Fill pose error and Jacobian at joint angles q, with the columns of locked joints at 0."""
     newton, error = line.newton, _error_on_line(scene, line, q)
     fill_jacobian(newton.link_R, newton.link_p, newton.p_AT, newton.J)
+    fill_sliding(scene.chain_p, newton.link_R, newton.J)
     for k in range(7):
         if line.locked[k] == 1:
             for i in range(6):
                 newton.J[i, k] = 0.0
+    if may_turn(scene):
+        for r in range(3):
+            newton.J[r, 0], newton.J[3 + r, 0] = _turn_in_base(scene, line, r), 0.0
     return error
 
 
@@ -300,6 +334,8 @@ def next_on_line(
                 break
             factorise(line.newton, 0.0)
             step_to_goal(line.newton, line.q, LONGEST_STEP)
+            if may_turn(scene):
+                line.q[0] = 0.0
         square, worst, beyond = 0.0, 0.0, -1
         locked = 0
         for k in range(7):
@@ -338,7 +374,10 @@ def tangent_on_line(
         newton.error[r], newton.error[3 + r] = 0.0, offset[r]
     for k in range(7):
         tangent[k] = 0.0
-    return np.isfinite(step_to_goal(newton, tangent, np.inf))
+    length = step_to_goal(newton, tangent, np.inf)
+    if may_turn(scene):
+        tangent[0] = 0.0
+    return np.isfinite(length)
 
 
 @inner

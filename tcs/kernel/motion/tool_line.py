@@ -12,7 +12,8 @@ value at the middle,
 
 (the error of the polynomial through these five values). The fifth derivative of a point at most L
 from the first joint along the arm is at most `L B`, B the fifth complete Bell polynomial of bounds
-on the sums of the joints' first, second and third derivatives: each rotation is an exponential.
+on the sums of the joints' first, second and third derivatives: each rotation is an exponential, and
+the motion of a prismatic joint by s counts as a rotation by s / L.
 """
 
 from __future__ import annotations
@@ -21,11 +22,8 @@ import numpy as np
 
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner
-from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
+from tcs.kernel.motion.scene import SEEN_FROM_TOOL, MotionScene, MotionWorkspace
 
-SEEN_FROM_TOOL = 4
-"""First link whose motion is bounded by the joints between it and the tool too: no more joints are
-on that side than on the other."""
 BEYOND = 7.5e-5
 """Greatest value of `u^2 (1 - u)^2 |u - 1/2| / 120` in [0, 1], rounded up."""
 EXCESS = 1e-6
@@ -35,6 +33,13 @@ OFF, TURNED = 3, 4
 """In `MotionWorkspace.line`, after the motion in A [m]: bounds on the error of the motion of points
 of the last links fixed to the tool [m], inf if the tool follows no line; and on the rotation of the
 tool from its orientation on the line [rad]."""
+
+
+@inner
+def may_turn(scene: MotionScene) -> bool:
+    """Return whether straight motions may rotate the tool about `scene.turn`."""
+    turn = scene.turn
+    return bool(turn[0] != 0.0 or turn[1] != 0.0 or turn[2] != 0.0)
 
 
 @inner
@@ -62,10 +67,11 @@ def line_motion(work: MotionWorkspace) -> float:
 
 
 @inner
-def take_turns(work: MotionWorkspace, half: float) -> None:
+def take_turns(scene: MotionScene, work: MotionWorkspace, half: float) -> None:
     """Fill `turn`, as `planes.take_twists` does `twist`.
 
     Args:
+        scene: The scene.
         work: The tool follows a line.
         half: Half of the length of the piece, as a fraction of the curve.
     """
@@ -74,6 +80,11 @@ def take_turns(work: MotionWorkspace, half: float) -> None:
         turn[7, m], turn[7, 3 + m] = 0.0, half * line[m]
     for k in range(6, SEEN_FROM_TOOL - 1, -1):
         R, p, rate = work.link_R[k + 1], work.link_p[k + 1], work.rate[k]
+        if scene.slides[k] > 0.0:
+            for r in range(3):
+                turn[k, r] = turn[k + 1, r]
+                turn[k, 3 + r] = turn[k + 1, 3 + r] - scene.slides[k] * rate * R[r, 2]
+            continue
         x, y, z = rate * R[0, 2], rate * R[1, 2], rate * R[2, 2]
         turn[k, 0], turn[k, 1], turn[k, 2] = (
             turn[k + 1, 0] - x,
@@ -96,7 +107,7 @@ def take_line(
     off: float,
     turned: float,
 ) -> None:
-    """Let the tool follow a line on the current curve, a spline.
+    """Let the tool follow a line on the current curve, a spline, unless it may rotate on the way.
 
     Args:
         scene: The scene.
@@ -108,7 +119,19 @@ def take_line(
         off: Greatest distance of the tool from the line in the middle of a piece [m].
         turned: Greatest rotation from its orientation there [rad].
     """
+    if may_turn(scene):
+        work.line[OFF] = np.inf
+        return
     pieces = len(points) - 1
+    chain, aside = 0.0, scene.aside
+    for k in range(1, 7):
+        p = scene.chain_p[k]
+        length = np.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
+        if scene.slides[k] > 0.0:
+            length += scene.slides[k] * max(abs(scene.lower[k]), abs(scene.upper[k]))
+        chain += length
+        if k >= SEEN_FROM_TOOL:
+            aside += length
     first = second = third = changed = 0.0
     for k in range(7):
         a = b = c = d = 0.0
@@ -123,17 +146,13 @@ def take_line(
             b, c = max(b, max(abs(bend), abs(bend_end))), max(c, abs(bend_end - bend))
         for n in range(pieces + 1):
             d = max(d, abs(tangents[n, k] - slopes[n, k]) / pieces)
-        first, second, third, changed = first + a, second + b, third + c, changed + d
+        # A prismatic joint moves points no more than a rotation at the length of the arm would.
+        scale = scene.slides[k] / (chain + aside) if scene.slides[k] > 0.0 else 1.0
+        first, second = first + scale * a, second + scale * b
+        third, changed = third + scale * c, changed + scale * d
     square = first * first
     bell = first * square * square + 10.0 * square * (first * second + third)
     bell += second * (15.0 * first * second + 10.0 * third)
-    chain, aside = 0.0, scene.reach[SEEN_FROM_TOOL - 1]
-    for k in range(1, 7):
-        p = scene.chain_p[k]
-        length = np.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
-        chain += length
-        if k >= SEEN_FROM_TOOL:
-            aside += length
     # Other derivatives at the ends of a piece move its points by a quarter of them at most, and so
     # they do at its middle.
     per_length = BEYOND * bell + 0.5 * changed

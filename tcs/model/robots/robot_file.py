@@ -220,7 +220,7 @@ class RobotFile(Document):
         if len(self.arm_joints) != MOST_JOINTS:
             raise RobotError(
                 f"robot '{self.name}': {purpose} needs an arm of {MOST_JOINTS} joints, and this "
-                f"one has {len(self.arm_joints)}. It can be scored, selected and verified."
+                f"one has {len(self.arm_joints)}. It can be scored, verified and planned for."
             )
 
     def arm_rates(self) -> tuple[list[float], list[float]]:

@@ -28,7 +28,7 @@ def judge(owned_scene, owned_work, control, plane, meets):
     work.pieces[0] = len(control) // 3
     take_middle(work, 0.0, 1.0)
     take_posture(scene, work)
-    take_twists(work, 0.5)
+    take_twists(scene, work, 0.5)
     for k in range(len(scene.pair)):
         i, j, base = scene.pair[k]
         place_shape(scene, work, i)
@@ -96,7 +96,7 @@ def keep(owned_scene, owned_work, control, gap, plane):
     work.control[: len(control)] = control
     take_middle(work, 0.0, 1.0)
     take_posture(scene, work)
-    take_twists(work, 0.5)
+    take_twists(scene, work, 0.5)
     for k in range(len(scene.pair)):
         i, j, base = scene.pair[k]
         place_shape(scene, work, i)
@@ -137,7 +137,7 @@ def place(owned_scene, owned_work, control, t, half):
     work.control[: len(control)] = control
     take_middle(work, t - half, t + half)
     take_posture(scene, work)
-    take_twists(work, half)
+    take_twists(scene, work, half)
     for i in range(len(scene.links)):
         place_shape(scene, work, i)
 

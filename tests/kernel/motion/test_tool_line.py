@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from tcs.kernel.motion.edges import take_middle
 from tcs.kernel.motion.pairs import place_shape, take_posture
 from tcs.kernel.motion.planes import take_twists
+from tcs.kernel.motion.scene import SEEN_FROM_TOOL
 from tcs.kernel.motion.straight import (
     LIMITS,
     OFF_LINE,
@@ -18,7 +19,7 @@ from tcs.kernel.motion.straight import (
     straight_motion,
     take_pieces,
 )
-from tcs.kernel.motion.tool_line import SEEN_FROM_TOOL, take_line
+from tcs.kernel.motion.tool_line import take_line
 from tcs.kernel.verification.reference import link_poses
 from tcs.kernel.views import unowned
 from tests.kernel.arms import drake_arm
@@ -38,7 +39,7 @@ def place(owned_scene, owned_work, offset, points, tangents, errors, begin, end)
     take_line(scene, work, offset, points, tangents, tangents, errors[0], errors[1])
     take_middle(work, begin, end)
     take_posture(scene, work)
-    take_twists(work, 0.5 * (end - begin))
+    take_twists(scene, work, 0.5 * (end - begin))
     for i in range(len(scene.links)):
         place_shape(scene, work, i)
 
@@ -108,6 +109,6 @@ def place_without_line(owned_scene, owned_work):
     scene, work = unowned(owned_scene), unowned(owned_work)
     take_middle(work, 0.0, 1.0)
     take_posture(scene, work)
-    take_twists(work, 0.5)
+    take_twists(scene, work, 0.5)
     for i in range(len(scene.links)):
         place_shape(scene, work, i)

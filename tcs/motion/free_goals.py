@@ -1,0 +1,63 @@
+"""Where in its freedom a goal is reached: motions lead to that pose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from tcs.kernel.arrays import FloatArray, GridArrays, IntArray
+from tcs.kernel.motion.scene import goal_from_arm_base
+from tcs.kernel.postures import tool_poses
+from tcs.kernel.problem import Problem
+from tcs.kernel.rows import rows_at
+from tcs.kernel.scores import REACHED, new_scores
+from tcs.kernel.sweep import gripper_contacts, score_rows
+
+Pose = tuple[FloatArray, FloatArray]
+"""Orientation, shape (3, 3), and position [m], shape (3,)."""
+
+
+class FreeGoalPoses:
+    """The pose at which each goal of a scene is reached from its initial configurations.
+
+    It is that of the most dexterous posture that scoring finds. Of a goal that is not reached, or
+    not free, it is the nominal pose.
+    """
+
+    def __init__(self, problem: Problem, grid: GridArrays, free: Sequence[bool]) -> None:
+        """Take a scene, its configurations, and whether each of its goals is free."""
+        self._problem, self._grid, self._free = problem, grid, free
+        self._known: dict[int, list[Pose]] = {}
+
+    def at(self, configuration: int) -> list[Pose]:
+        """Return X_GT of every goal, the pose of the tool in the frame of the goal.
+
+        Args:
+            configuration: Flat index of the initial configuration.
+        """
+        if configuration not in self._known:
+            self._known[configuration] = self._scored(configuration)
+        return self._known[configuration]
+
+    @cached_property
+    def _grippers(self) -> IntArray:
+        return gripper_contacts(self._problem)
+
+    def _scored(self, configuration: int) -> list[Pose]:
+        problem, row = self._problem, rows_at(self._grid, [configuration])
+        goals = problem.goal_p.shape[1]
+        scores = new_scores(1, goals)
+        score_rows(problem, self._grippers, row, scores)
+        q = scores.joints[0].astype(np.float64)
+        R_AT, p_AT = np.empty((goals, 3, 3)), np.empty((goals, 3))
+        tool_poses(problem.chain_R, problem.chain_p, q, R_AT, p_AT)
+        poses = []
+        for goal, reason in enumerate(scores.reason[0]):
+            R_GT, p_GT = np.eye(3), np.zeros(3)
+            if self._free[goal] and reason == REACHED:
+                R_AG, p_AG = goal_from_arm_base(problem, row, goal)
+                R_GT, p_GT = R_AG.T @ R_AT[goal], R_AG.T @ (p_AT[goal] - p_AG)
+            poses.append((R_GT, p_GT))
+        return poses
