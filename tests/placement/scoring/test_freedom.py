@@ -7,11 +7,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from tcs.errors import ArmClassError, TaskError
+from tcs.errors import ArmClassError
 from tcs.files.paths import data_folder
 from tcs.kernel.verification import free_scans
 from tcs.model.tasks import Freedom
-from tcs.motion.stops import StopGrid
 from tcs.placement.scoring import load_job, score, verify
 from tcs.placement.scoring.drake_check import ROTATION_BAR, DrakeChecker
 from tcs.placement.tables import Reason
@@ -75,10 +74,7 @@ def test_the_file_says_what_is_free(file):
     assert file.task["goals"][0]["free"] == "any rotation about y"
 
 
-def test_approaches_and_motions_refuse_free_goals_in_a_line(file, paths):
+def test_approaches_refuse_free_goals_in_a_line(file, paths):
     assert file.metadata["no_approach"].endswith("goals of this task are free")
     with pytest.raises(ArmClassError, match="goals of this task are free"):
         score(*paths, approach=True)
-    job = load_job(*paths, "pr2")
-    with pytest.raises(TaskError, match="goals with freedom"):
-        StopGrid.of(job, None, job.grid, None)
