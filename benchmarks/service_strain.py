@@ -32,12 +32,12 @@ import numpy as np
 from service import Asked, Served, served
 from table import cell, header, parser, row, save
 
-from tcs.files.compression import compress
 from tcs.files.joblib_file import write_joblib
 from tcs.placement.store import load_scores, save_scores
 from tcs.placement.store.encoding import encode
 
 OCTETS = "application/octet-stream"
+HERE = (1.4, -1.2, 180.0)
 BETWEEN = 0.01
 """Pause between two selections [s]."""
 LONGEST = 60.0
@@ -94,7 +94,7 @@ def regions(to: To) -> None:
     radius = 1.0 + 0.3 * np.sin(40.0 * angles)
     region = np.column_stack([radius * np.cos(angles), radius * np.sin(angles)]).round(4)
     forbid = [(region + np.array((0.1 * i, 0.0))).tolist() for i in range(4)]
-    to.post("/v1/select", json.dumps({"file": to.file, "forbid": forbid}).encode())
+    to.post("/v1/select", json.dumps({"file": to.file, "here": HERE, "forbid": forbid}).encode())
 
 
 def megabyte(to: To) -> None:
@@ -118,16 +118,9 @@ def upload(to: To) -> None:
 
 
 def claims(to: To) -> None:
-    """Send a score file whose pairs of cells decode to two hundred times its size."""
+    """Send a score file that has the same table two hundred times."""
     content = encode(load_scores(to.path))
-    sets, count = content["tables"][0]["sets"], 20_000_000
-    for name, element in (
-        ("pair_step", np.uint8), ("pair_count", np.uint8), ("reachability_code", np.uint8),
-        ("pair_manipulability", np.float32), ("pair_sum", np.float32),
-    ):  # fmt: skip
-        sets[name] = compress(np.zeros(count, element))
-    # Its arrays may claim so much where the rest of it is as large.
-    sets["reachability_values"] = compress(np.random.default_rng(0).random(300_000))
+    content["tables"] *= 200
     with tempfile.NamedTemporaryFile() as file:
         write_joblib(Path(file.name), content, "Score file")
         to.post("/v1/files", Path(file.name).read_bytes(), OCTETS)
@@ -231,8 +224,6 @@ def measure(
         times.append(taken)
         most = max(most, memory_of(server.pid))
     report(name, "meanwhile", times)
-    ratio = [np.quantile(times, q) / np.quantile(alone[50:], q) for q in (0.5, 0.99)]
-    row(f"{name}, meanwhile / alone, p50 and p99", " ".join(f"{r:.1f}" for r in ratio))
     text = f"{(most - before) / 1e6:.0f} MB"
     row(f"{name}, memory", text)
     cell("service_strain", name, "memory", text)
@@ -256,26 +247,32 @@ def strained(name: str, to: To, seconds: float) -> None:
 
 
 def selections(to: To, asked: Asked, end: float, is_wanted: Callable[[], bool]) -> Iterator[float]:
-    """Yield how long each selection of a client takes [s]."""
+    """Yield how long each selection of a client takes [s]; infinity for one that is refused."""
     connection = http.client.HTTPConnection("127.0.0.1", to.port, timeout=2 * LONGEST)
     while time.monotonic() < end and is_wanted():
         body, begun = asked.body(), time.perf_counter()
         try:
             connection.request("POST", "/v1/select", body, {"Content-Type": "application/json"})
-            connection.getresponse().read()
+            response = connection.getresponse()
+            response.read()
+            # 422: a start that is enclosed by furniture.
+            taken = time.perf_counter() - begun if response.status in (200, 422) else math.inf
         except (OSError, http.client.HTTPException):
             # Closed where there are too many connections; the next one is a new one.
             connection.close()
-        yield time.perf_counter() - begun
+            taken = math.inf
+        yield taken
         time.sleep(BETWEEN)
     connection.close()
 
 
 def report(name: str, when: str, times: list[float]) -> None:
     """Print and record the latencies [s]."""
-    text = " / ".join(f"{1e3 * float(np.quantile(times, q)):.2f}" for q in (0.5, 0.99, 1.0))
-    row(f"{name}, {when}, p50 / p99 / most", f"{text} ms ({len(times)})")
-    cell("service_strain", name, f"{when} (p50 / p99 / most)", f"{text} ms")
+    answered = [taken for taken in times if taken < math.inf] or [math.inf]
+    text = " / ".join(f"{1e3 * float(np.quantile(answered, q)):.2f}" for q in (0.5, 0.99, 1.0))
+    refused = f"{sum(taken == math.inf for taken in times)} of {len(times)} refused"
+    row(f"{name}, {when}, p50 / p99 / most", f"{text} ms, {refused}")
+    cell("service_strain", name, f"{when} (p50 / p99 / most)", f"{text} ms, {refused}")
 
 
 def memory_of(pid: int) -> int:
