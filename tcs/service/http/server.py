@@ -20,9 +20,9 @@ _LEAST_TOKEN = 16
 """Fewest characters of a token."""
 _GRACE = 2
 """Longest wait for open requests at the end [s]."""
-_TURN = 0.0005
+_TURN = 0.002
 """Longest time for which Python lets another thread go on while the one that answers waits [s]; by
-default it is ten times as long, which is far more than a selection takes."""
+default it is more than twice as long. Less would take more of the processor with many clients."""
 _KEEP_ALIVE = 20
 """Time after which an idle connection is closed [s]."""
 
