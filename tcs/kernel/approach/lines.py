@@ -12,6 +12,7 @@ from tcs.kernel.analytic.ik import within
 from tcs.kernel.approach.curve import MOST, finish_spline, is_too_fast, spline_is_free
 from tcs.kernel.approach.grid import NOWHERE, PIECES
 from tcs.kernel.approach.memory import Approach
+from tcs.kernel.approach.opening import end_of_window
 from tcs.kernel.approach.scene import pair_contact_code
 from tcs.kernel.approach.turns import place_sample
 from tcs.kernel.arrays import FloatArray
@@ -86,18 +87,25 @@ def lead_from(problem: Problem, approach: Approach, fastest: FloatArray, first: 
 def lead_through_windows(
     problem: Problem, approach: Approach, fastest: FloatArray, b: int, level: int
 ) -> bool:
-    """Follow lines through all windows of a level of a branch.
+    """Follow lines through all windows of a level of a branch, and through their ends.
 
     Returns:
         Whether one is free; `search.best` is filled then, with the posture at the goal.
     """
-    low, high = _next_window(approach, b, level, approach.grid.spans[b, level, 0])
+    grid = approach.grid
+    low, high = _next_window(approach, b, level, grid.spans[b, level, 0])
     while low != NOWHERE:
         width = high + 1 - low
         count = (width + APART - 1) // APART
         for n in range(count):
             column = low + (2 * n + 1) * width // (2 * count)
-            if _lead_through(problem, approach, fastest, b, column, level):
+            angle = grid.origin[0] + column * grid.origin[1]
+            if _lead_through(problem, approach, fastest, b, angle, level):
+                return True
+        # What is free of contact may be next to a limit alone, closer than the columns are.
+        for side in range(2):
+            angle = end_of_window(problem, approach, b, level, high if side else low, side == 1)
+            if _lead_through(problem, approach, fastest, b, angle, level):
                 return True
         low, high = _next_window(approach, b, level, high + 1)
     return False
@@ -105,20 +113,19 @@ def lead_through_windows(
 
 @inner
 def _lead_through(
-    problem: Problem, approach: Approach, fastest: FloatArray, b: int, column: int, level: int
+    problem: Problem, approach: Approach, fastest: FloatArray, b: int, angle: float, level: int
 ) -> bool:
-    """Follow the line through a node of the grid; return whether it is free.
+    """Follow the line through a posture at a level of the grid; return whether it is free.
 
     Args:
         problem: The scene.
         approach: The grid is in place; `search.best` is filled, with the posture at the goal.
         fastest: As for `approach_pair`.
         b: The branch.
-        column: Column of the node.
+        angle: Its free joint [rad].
         level: Its level.
     """
     arm, grid, search = problem.arm, approach.grid, approach.search
-    angle = grid.origin[0] + column * grid.origin[1]
     place_sample(arm, grid.goal[level], arm.branches[b], angle, search.q, approach.motion.turns)
     if lead_from(problem, approach, fastest, level * PER_LEVEL) != DONE:
         return False

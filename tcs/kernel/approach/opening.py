@@ -16,6 +16,8 @@ from tcs.kernel.approach.memory import Approach
 from tcs.kernel.cache import inner, int_constant
 from tcs.kernel.problem import Problem
 
+HALVINGS = 5
+"""Number of times that the distance of two columns is halved to find the end of a window."""
 GOAL, ONE, BEGIN = int_constant(0), int_constant(1), int_constant(PIECES)
 
 
@@ -66,6 +68,45 @@ def make_whole(problem: Problem, approach: Approach, b: int) -> None:
     """Fill the levels of a branch beyond the goal, unless they are filled."""
     if not approach.grid.is_whole[b]:
         _complete(problem, approach, b, 0, approach.columns[0] - 1)
+
+
+@inner
+def end_of_window(
+    problem: Problem, approach: Approach, b: int, level: int, column: int, is_high: bool
+) -> float:
+    """Return the free joint [rad] where limits end a window, less than a column beyond its last.
+
+    Args:
+        problem: The scene.
+        approach: The levels and columns are in place.
+        b: The branch.
+        level: Level of the window.
+        column: Its first or last column.
+        is_high: Whether that is the last one.
+    """
+    arm, grid = problem.arm, approach.grid
+    inside = grid.origin[0] + column * grid.origin[1]
+    outside = inside + (grid.origin[1] if is_high else -grid.origin[1])
+    outside = min(max(outside, arm.lower[arm.free]), arm.upper[arm.free])
+    if _is_open_at(problem, approach, b, level, outside):
+        return outside
+    for _ in range(HALVINGS):
+        middle = 0.5 * (inside + outside)
+        if _is_open_at(problem, approach, b, level, middle):
+            inside = middle
+        else:
+            outside = middle
+    return inside
+
+
+@inner
+def _is_open_at(problem: Problem, approach: Approach, b: int, level: int, angle: float) -> bool:
+    """Return whether a level is open at an angle of the free joint within its limits [rad]."""
+    search = approach.search
+    search.cosine[0], search.sine[0] = np.cos(angle), np.sin(angle)
+    _take_goal(search, approach.grid, level)
+    solve(problem.arm, search, b, ONE)
+    return bool(search.slack[0] >= 0.0)
 
 
 @inner

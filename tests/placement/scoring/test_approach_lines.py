@@ -20,6 +20,8 @@ from tcs.placement.scoring.approaches import approach_lines
         ("fr3", 24276, 4),
         # The wrist is straight at the begin: joints 5 and 7 turn fast against each other.
         ("tiago", 81538, 4),
+        # Only next to a limit, closer than the grid's angles, does nothing touch.
+        ("pr2", 80857, 0),
     ],
 )
 def test_approaches_that_only_newton_follows_are_found_and_confirmed_by_drake(robot, at, goal):
