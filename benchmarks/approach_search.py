@@ -6,7 +6,8 @@ The line is divided into levels. From all postures at one end of it, at most a s
 curves of solutions, each posture leads to those of the next level that the tool's motion and a step
 along the curve there reach within the velocity limits; a joint beyond a limit rests there. What
 these lead to at the other end is a path; Drake judges it at postures a quarter of a millimetre of
-the line apart: on the line, within limits and velocity limits, and free of contact.
+the line apart: on the line, within limits and velocity limits, and free of contact. A refusal is
+searched at short steps only if a path is found at long ones with wider limits and no contacts.
 """
 
 from __future__ import annotations
@@ -19,13 +20,15 @@ import numpy as np
 from numba import njit
 from table import cell, header, parser, row, save
 
-from tcs.kernel.arrays import FloatArray, IntArray
+from tcs.kernel.analytic.solver import ArmSolver
+from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
 from tcs.kernel.motion.edges import posture_contact
 from tcs.kernel.motion.postures import postures_at
-from tcs.kernel.motion.scene import NO_PAIR
+from tcs.kernel.motion.scene import NO_PAIR, MotionScene, MotionWorkspace
+from tcs.kernel.motion.trees import new_trees
 from tcs.model.scene import NeighbourList
 from tcs.motion.recheck import CLEARANCE_ROUNDING
-from tcs.motion.stops import Stop
+from tcs.motion.stops import Stop, StopGrid
 from tcs.placement.robustness.statistics import binomial_interval
 from tcs.placement.scoring import load_job, sweep
 from tcs.placement.scoring.approaches import approach_lines
@@ -39,6 +42,9 @@ SEEDS = 2000
 """Values of the free joint of the closed form from which the curves at the end are found."""
 PASSES = (0.04, 20, 1), (0.01, 40, 3)
 """Step along the curves [rad], number of levels, and most steps from one level to the next."""
+WIDER, FASTER = 0.1, 1.5
+"""How much wider joint limits are [rad], and how much faster joints, where a path is sought first
+that may be near: more than a long step can miss."""
 MOST = 20_000
 """Greatest number of postures of a level."""
 FINE = 0.00025
@@ -70,51 +76,134 @@ class Arm(NamedTuple):
     """From there to the end [m]."""
 
 
+class Scratch(NamedTuple):
+    """Kinematics at one posture."""
+
+    R: FloatArray
+    """Orientation of the current link, its product with a turn, and a turn, shape (3, 3, 3)."""
+    p: FloatArray
+    """Position of the tool [m], shape (3,)."""
+    axes: FloatArray
+    """Axes of the joints, shape (7, 3)."""
+    origins: FloatArray
+    """Points on them [m], shape (7, 3)."""
+    J: FloatArray
+    """Jacobian, shape (6, 7)."""
+    error: FloatArray
+    """Pose error [rad and m], shape (6,)."""
+    G: FloatArray
+    """The product of the Jacobian and its transpose, and right-hand sides, shape (6, 13)."""
+
+
 @njit
-def _tool(arm: Arm, q: FloatArray, J: FloatArray, error: FloatArray, at: float) -> None:
+def _scratch() -> Scratch:
+    """Return memory for kinematics."""
+    return Scratch(
+        np.empty((3, 3, 3)), np.empty(3), np.empty((7, 3)), np.empty((7, 3)), np.empty((6, 7)),
+        np.empty(6), np.empty((6, 13)),
+    )  # fmt: skip
+
+
+@njit
+def _times(A: FloatArray, B: FloatArray, out: FloatArray) -> None:
+    """Fill the product of two matrices, shape (3, 3)."""
+    for r in range(3):
+        for c in range(3):
+            out[r, c] = A[r, 0] * B[0, c] + A[r, 1] * B[1, c] + A[r, 2] * B[2, c]
+
+
+@njit
+def _tool(arm: Arm, q: FloatArray, work: Scratch, at: float) -> None:
     """Fill the Jacobian and the pose error at a fraction of the line."""
-    R, p = np.eye(3), np.zeros(3)
-    axes, origins = np.empty((7, 3)), np.empty((7, 3))
-    for k in range(7):
-        p = p + R @ arm.p[k]
-        R = R @ arm.R[k]
-        c, s = np.cos(q[k]), np.sin(q[k])
-        R = R @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        axes[k], origins[k] = R[:, 2], p
-    p = p + R @ arm.p[7]
-    R = R @ arm.R[7]
-    for k in range(7):
-        J[:3, k], J[3:, k] = axes[k], np.cross(axes[k], p - origins[k])
+    R, turned, turn = work.R[0], work.R[1], work.R[2]
+    p, J, error = work.p, work.J, work.error
     for r in range(3):
+        p[r] = 0.0
+        for c in range(3):
+            R[r, c] = turn[r, c] = 1.0 if r == c else 0.0
+    for k in range(8):
+        for r in range(3):
+            p[r] += R[r, 0] * arm.p[k, 0] + R[r, 1] * arm.p[k, 1] + R[r, 2] * arm.p[k, 2]
+        _times(R, arm.R[k], turned)
+        if k < 7:
+            turn[0, 0] = turn[1, 1] = np.cos(q[k])
+            turn[1, 0] = np.sin(q[k])
+            turn[0, 1] = -turn[1, 0]
+            _times(turned, turn, R)
+            for r in range(3):
+                work.axes[k, r], work.origins[k, r] = R[r, 2], p[r]
+    for k in range(7):
+        for r in range(3):
+            s, t = (r + 1) % 3, (r + 2) % 3
+            J[r, k] = work.axes[k, r]
+            J[3 + r, k] = work.axes[k, s] * (p[t] - work.origins[k, t]) - work.axes[k, t] * (
+                p[s] - work.origins[k, s]
+            )
+    for r in range(3):
+        for c in range(3):
+            turn[r, c] = 0.0
+            for m in range(3):
+                turn[r, c] += arm.R_AG[r, m] * turned[c, m]
+    for r in range(3):
+        s, t = (r + 1) % 3, (r + 2) % 3
+        error[r] = 0.5 * (turn[t, s] - turn[s, t])
         error[3 + r] = arm.p_AG[r] + at * arm.offset[r] - p[r]
-    turn = arm.R_AG @ R.T
-    for r in range(3):
-        error[r] = 0.5 * (turn[(r + 2) % 3, (r + 1) % 3] - turn[(r + 1) % 3, (r + 2) % 3])
-    if np.trace(turn) < 1.0:
+    if turn[0, 0] + turn[1, 1] + turn[2, 2] < 1.0:
         error[0] = 1.0
 
 
 @njit
-def _onto(arm: Arm, q: FloatArray, at: float) -> bool:
+def _solve(work: Scratch, sides: int) -> None:
+    """Solve J J' X = B in place; B, shape (6, sides), is in `G` from column 6 on."""
+    J, G = work.J, work.G
+    for i in range(6):
+        for j in range(6):
+            G[i, j] = 1e-12 if i == j else 0.0
+            for k in range(7):
+                G[i, j] += J[i, k] * J[j, k]
+    for i in range(6):
+        for r in range(6):
+            if r != i:
+                factor = G[r, i] / G[i, i]
+                for c in range(i, 6 + sides):
+                    G[r, c] -= factor * G[i, c]
+    for i in range(6):
+        for c in range(6, 6 + sides):
+            G[i, c] /= G[i, i]
+
+
+@njit
+def _onto(arm: Arm, q: FloatArray, at: float, work: Scratch) -> bool:
     """Move a posture to a fraction of the line by short steps; one joint may rest at a limit."""
-    J, error = np.empty((6, 7)), np.empty(6)
+    J, G = work.J, work.G
     resting = -1
     for _ in range(20):
-        _tool(arm, q, J, error, at)
-        if np.abs(error).max() < AT_POSE:
-            beyond = np.maximum(q - arm.upper, arm.lower - q)
-            k = int(np.argmax(beyond))
-            if beyond[k] <= 1e-9:
+        _tool(arm, q, work, at)
+        if np.abs(work.error).max() < AT_POSE:
+            most, beyond = 1e-9, -1
+            for k in range(7):
+                over = max(q[k] - arm.upper[k], arm.lower[k] - q[k])
+                if over > most:
+                    most, beyond = over, k
+            if beyond < 0:
                 return True
             if resting >= 0:
                 return False
-            resting = k
-            q[k] = arm.upper[k] if q[k] > arm.upper[k] else arm.lower[k]
-            _tool(arm, q, J, error, at)
+            resting = beyond
+            q[beyond] = arm.upper[beyond] if q[beyond] > arm.upper[beyond] else arm.lower[beyond]
+            _tool(arm, q, work, at)
         if resting >= 0:
             J[:, resting] = 0.0
-        q += J.T @ np.linalg.solve(J @ J.T + 1e-12 * np.eye(6), error)
-        if not np.all(np.isfinite(q)):
+        G[:, 6] = work.error
+        _solve(work, 1)
+        moved = 0.0
+        for k in range(7):
+            change = 0.0
+            for r in range(6):
+                change += J[r, k] * G[r, 6]
+            q[k] += change
+            moved += abs(change)
+        if not moved < np.inf:
             return False
     return False
 
@@ -138,22 +227,39 @@ def _spread(
         np.empty((len(q) * (2 * most + 1), 7)),
         np.empty(len(q) * (2 * most + 1), np.int64),
     )
-    count = 0
-    J, error = np.empty((6, 7)), np.empty(6)
+    count, work = 0, _scratch()
+    J, G = work.J, work.G
+    forward, along = np.empty(7), np.empty(7)
     for i in range(len(q)):
-        _tool(arm, q[i], J, error, at)
-        error[:3] = 0.0
-        error[3:] = ahead * arm.offset
-        inverse = J.T @ np.linalg.inv(J @ J.T + 1e-12 * np.eye(6))
-        forward, null = inverse @ error, np.eye(7) - inverse @ J
+        _tool(arm, q[i], work, at)
+        G[:3, 6], G[3:, 6], G[:, 7:13] = 0.0, ahead * arm.offset, np.eye(6)
+        _solve(work, 7)
+        forward[:] = J.T @ np.ascontiguousarray(G[:, 6])
+        null = np.eye(7) - J.T @ (np.ascontiguousarray(G[:, 7:13]) @ J)
         widest = int(np.argmax(np.diag(null)))
-        along = null[widest] / np.sqrt(max(null[widest, widest], 1e-12))
+        along[:] = null[widest] / np.sqrt(max(null[widest, widest], 1e-12))
         for m in range(-most, most + 1):
-            trial = q[i] + forward + m * step * along
-            if _onto(arm, trial, at + ahead) and np.all(np.abs(trial - q[i]) <= allowed):
-                found[count], origin[count] = trial, i
+            trial, is_far = found[count], False
+            for k in range(7):
+                change = forward[k] + m * step * along[k]
+                trial[k] = q[i, k] + change
+                # Of the steps that follow, none is as long as one along the curves.
+                is_far |= abs(change) > allowed[k] + step
+            if is_far or not _onto(arm, trial, at + ahead, work):
+                continue
+            if np.all(np.abs(trial - q[i]) <= allowed):
+                origin[count] = i
                 count += 1
     return found[:count], origin[:count]
+
+
+@njit
+def _are_free(scene: MotionScene, work: MotionWorkspace, q: FloatArray) -> BoolArray:
+    """Return whether postures are free of contact, shape (n,)."""
+    free = np.empty(len(q), np.bool_)
+    for n in range(len(q)):
+        free[n] = posture_contact(scene, work, q[n]) == NO_PAIR
+    return free
 
 
 def _new(arm: Arm, q: FloatArray, step: float, seen: set[bytes]) -> IntArray:
@@ -171,15 +277,15 @@ def _new(arm: Arm, q: FloatArray, step: float, seen: set[bytes]) -> IntArray:
 
 
 def find_path(
-    arm: Arm, ends: FloatArray, is_free: Callable[[FloatArray], bool], step: float, levels: int,
-    most: int,
+    arm: Arm, ends: FloatArray, are_free: Callable[[FloatArray], BoolArray], step: float,
+    levels: int, most: int,
 ) -> FloatArray | None:  # fmt: skip
     """Return postures along the whole line, shape (levels + 1, 7), None if none are found.
 
     Args:
         arm: The arm and the line.
         ends: Postures where it begins [rad], shape (n, 7).
-        is_free: Whether a posture is free of contact.
+        are_free: Whether postures, shape (n, 7), are free of contact.
         step: Step along the curves of solutions [rad].
         levels: Number of levels of the line after the first.
         most: Most steps along the curves from level to level.
@@ -192,13 +298,13 @@ def find_path(
         front = front[_new(arm, front, step, seen)]
         grown.append(front)
     front = np.concatenate(grown)
-    front = front[[is_free(q) for q in front]] if len(front) else front
+    front = front[are_free(front)]
     fronts, origins = [front], []
     for level in range(levels):
         at, ahead = level / levels, 1.0 / levels
         front, origin = _spread(arm, front, at, ahead, step, most, 0.99 * arm.fastest * ahead)
         kept = _new(arm, front, step, set())[:MOST]
-        kept = kept[[is_free(q) for q in front[kept]]] if len(kept) else kept
+        kept = kept[are_free(front[kept])]
         if not len(kept):
             return None
         front = front[kept]
@@ -235,22 +341,27 @@ def search(stop: Stop, neighbours: NeighbourList, goal: int, fastest: FloatArray
     """
     R_AG, p_AG = stop.goal_in_arm_base(goal)
     back = -R_AG @ np.asarray(stop.job.task.goals[goal].approach.offset)
-    problem = stop.problem
-    limits = problem.arm.lower, problem.arm.upper
-    chain = np.ascontiguousarray(problem.chain_R), np.ascontiguousarray(problem.chain_p[:, :3])
+    lines = (p_AG, back), (p_AG + back, -back)
+    chain = np.ascontiguousarray(stop.problem.chain_R), np.ascontiguousarray(stop.problem.chain_p)
 
-    def contact_free(q: FloatArray) -> bool:
-        return bool(posture_contact(stop.lines, stop.line_work, q) == NO_PAIR)
+    def path_of(solver: ArmSolver, line: tuple[FloatArray, FloatArray], factor: float,
+                are_free: Callable[[FloatArray], BoolArray], how: tuple[float, int, int],
+    ) -> tuple[Arm, FloatArray | None]:  # fmt: skip
+        arm = Arm(*chain, solver.lower, solver.upper, factor * fastest, R_AG, *line)
+        ends = postures_at(stop.problem._replace(arm=solver), R_AG, line[0], SEEDS)
+        return arm, find_path(arm, ends, are_free, *how)
 
+    solver = stop.problem.arm
+    wide = solver._replace(lower=solver.lower - WIDER, upper=solver.upper + WIDER)
     refuted = Found(None, False, 0.0, 0.0)
-    for step, levels, most in PASSES:
-        for begin, offset in ((p_AG, back), (p_AG + back, -back)):
-            arm = Arm(*chain, *limits, fastest, R_AG, begin, offset)
-            ends = postures_at(problem, R_AG, begin, SEEDS)
-            path = find_path(arm, ends, lambda q: True, step, levels, most)
-            if path is None:
-                continue
-            path = find_path(arm, ends, contact_free, step, levels, most)
+    near = (path_of(wide, line, FASTER, _any, PASSES[0])[1] for line in lines)
+    if all(path is None for path in near):
+        return refuted
+    for how in PASSES:
+        for line in lines:
+            arm, path = path_of(
+                solver, line, 1.0, lambda q: _are_free(stop.lines, stop.line_work, q), how
+            )
             if path is None:
                 continue
             for _ in range(3):
@@ -261,13 +372,18 @@ def search(stop: Stop, neighbours: NeighbourList, goal: int, fastest: FloatArray
     return refuted
 
 
+def _any(q: FloatArray) -> BoolArray:
+    """Return that all postures count."""
+    return np.ones(len(q), np.bool_)
+
+
 def _evened(arm: Arm, path: FloatArray) -> FloatArray:
     """Return a path with each posture moved towards the mean of those before and after it."""
-    path, levels = path.copy(), len(path) - 1
+    path, levels, work = path.copy(), len(path) - 1, _scratch()
     for _ in range(EVEN):
         for n in range(1, levels):
             q = 0.5 * (path[n - 1] + path[n + 1])
-            if _onto(arm, q, n / levels):
+            if _onto(arm, q, n / levels, work):
                 path[n] = q
     return path
 
@@ -276,12 +392,12 @@ def _judged(stop: Stop, neighbours: NeighbourList, arm: Arm, path: FloatArray) -
     """Return the finding on a path between whose postures the joints move straight."""
     levels = len(path) - 1
     parts = int(np.ceil(np.linalg.norm(arm.offset) / FINE / levels))
-    fine, is_true = [path[0]], True
+    fine, is_true, work = [path[0]], True, _scratch()
     for level in range(levels):
         for part in range(1, parts + 1):
             share = part / parts
             q = (1.0 - share) * path[level] + share * path[level + 1]
-            is_true &= _onto(arm, q, (level + share) / levels)
+            is_true &= _onto(arm, q, (level + share) / levels, work)
             fine.append(q)
     q = np.array(fine)
     speed = np.abs(np.diff(q, axis=0)) * (levels * parts) / arm.fastest
@@ -310,6 +426,7 @@ def refusals(robot: str, most: int, seed: int) -> None:
     lowered = job.lowered(scene)
     (table,) = sweep(lowered, job.task.weights, jobs=1, approaches=lines).tables
     neighbours = NeighbourList(scene)
+    stops, trees = StopGrid.of(job, scene, job.scored_grid, lowered), new_trees(seed)
     for reason in APPROACH:
         refused = np.argwhere(table.reason == reason)
         order = np.random.default_rng(seed).permutation(len(refused))
@@ -320,7 +437,9 @@ def refusals(robot: str, most: int, seed: int) -> None:
             continue
         free = 0
         for number, goal in looked_at.tolist():
-            stop = Stop.of(job, scene, number, seed)
+            stop = stops.stop(number, trees)
+            values = job.scored_grid.values(np.array([number]))
+            stop.place({axis: float(value[0]) for axis, value in values.items()})
             found = search(stop, neighbours, goal, lines.fastest[goal])
             free += found.is_true
             if found.path is not None:
@@ -333,7 +452,7 @@ def refusals(robot: str, most: int, seed: int) -> None:
         kind = "limits" if reason == Reason.APPROACH_LIMITS else "blocked"
         cell("refusals", robot, f"refused, {kind}", f"{len(refused):,}")
         cell("refusals", robot, f"looked at, {kind}", f"{len(looked_at):,}")
-        cell("refusals", robot, f"free, {kind}", f"{free} ({low:.1%} .. {high:.1%})")
+        cell("refusals", robot, f"free, {kind}", f"{free} ({low:.1%} to {high:.1%})")
         row(f"{robot}, {kind}", f"{free} free of {len(looked_at)} of {len(refused)}")
 
 

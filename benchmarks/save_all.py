@@ -42,6 +42,7 @@ PARTS: dict[str, tuple[str, ...]] = {
         *("--rows", "shaving/wheelchair", "feeding/wheelchair", "bathing/bed"),
         *("--pairs", "100"),
     ),
+    "approach_search": (),
     "motions": (
         *(
             f"{SCORES}/{name}-pr2.tcs"
