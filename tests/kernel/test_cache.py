@@ -200,9 +200,8 @@ def test_an_edit_recompiles_what_depends_on_it_and_nothing_else(tmp_path):
         "trial_other||": "6.0 0",
         "trial_other||x = 1": "6.0 1",
         "trial_numbers|2.0|4.0": "12.0 0",
-        "trial_numbers|4.0|2.0": "6.0 1",
-        "trial_types|a: float\n    b: float|b: float\n    a: float": "6.0 0",
-        "sweep|import|import ": "6.0 1",
+        "trial_types|a: float\n    b: float|b: float\n    a: float": "12.0 0",
+        "trial_numbers|4.0|2.0": "6.0 0",
     }
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT, *edits],
