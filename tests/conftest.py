@@ -11,6 +11,7 @@ import pytest
 import typer.main
 import typer.testing
 
+from tcs.kernel import second_process
 from tcs.model.grid import Grid
 from tcs.model.robots import load_robot
 from tcs.model.scene import Scene, SceneSpec, load_environment, lower
@@ -27,11 +28,22 @@ FIRST = (
     "kernel/test_numeric_sweep.py",
     "model/robots/fitting/test_splitting.py",
     "kernel/approach/test_approach.py",
+    "kernel/test_together.py",
+    "kernel/test_real_scene.py",
+    "output/report/test_score_report.py",
+    "model/robots/self_collision/test_self_collision.py",
+    "placement/robustness/test_trials.py",
+    "placement/refinement/test_surest.py",
+    "cli/test_refine.py",
+    "motion/test_tours_in_report.py",
+    "placement/scoring/test_together.py",
+    "kernel/test_freedom.py",
 )
 """Files that `make test` begins with: one process fits shapes while the other compiles the kernel,
 so that neither compiles what the other is compiling. A process is given two files, and the next one
 when it has finished the first: the third and fifth are for the one that fits shapes. The sixth
-compiles approaches, before the many files that score with them."""
+compiles approaches, before the many files that score with them. The others take longest: last, they
+would keep one process busy alone."""
 
 
 def pytest_collection_modifyitems(items):
@@ -77,6 +89,14 @@ def _coarse_recheck():
     """Postures of the re-check are 4 cm apart: Drake takes ten milliseconds for each."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(recheck, "LARGEST_STEP", 0.04)
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _no_second_process():
+    """Compile in the processes of the tests alone, of which there are as many as processors."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(second_process, "_processors", lambda: 1)
         yield
 
 

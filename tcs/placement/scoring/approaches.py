@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Iterable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -20,6 +20,7 @@ from tcs.kernel.arrays import GridArrays
 from tcs.kernel.problem import Problem
 from tcs.kernel.rows import Rows, no_rows, rows_at
 from tcs.kernel.scores import REACHED, Scores, new_scores
+from tcs.kernel.second_process import compiled_beside
 from tcs.model.scene import Scene, arm_chain
 from tcs.model.tasks import TOOL_SPEED
 from tcs.placement.scoring.job import Job
@@ -138,14 +139,22 @@ class ApproachScorer:
 
         return approach_scene(self.problem)
 
-    def warm_up(self) -> float:
-        """Compile the kernel or load its machine code; return the time this took [s]."""
+    def warm_up(self) -> None:
+        """Compile the kernel or load its machine code."""
         from tcs.kernel.approach.sweep import score_approaches
 
-        begun = time.perf_counter()
-        none = _pairs_of(new_scores(0, self.problem.goal_p.shape[1]))
-        score_approaches(self.problem, self.lines, no_rows(), none, self.memory())
-        return time.perf_counter() - begun
+        score_approaches(self.problem, self.lines, no_rows(), self._no_pairs(), self.memory())
+
+    def compiled_beside(self) -> AbstractContextManager[None]:
+        """Have a second process compile what `warm_up` needs, if this one compiles within."""
+        from tcs.kernel.approach.sweep import score_approaches
+
+        return compiled_beside(
+            score_approaches, self.problem, self.lines, no_rows(), self._no_pairs()
+        )
+
+    def _no_pairs(self) -> ReachedPairs:
+        return _pairs_of(new_scores(0, self.problem.goal_p.shape[1]))
 
     def score(
         self,

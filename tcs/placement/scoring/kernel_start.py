@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 
 from tcs.kernel.analytic.solver import is_outside
 from tcs.kernel.cache import announced
 from tcs.kernel.problem import Problem
+from tcs.kernel.quick_flags import quicken_flags
 from tcs.kernel.rows import no_rows
 from tcs.kernel.scores import new_scores
 from tcs.kernel.sweep import gripper_contacts, score_rows
@@ -61,8 +63,11 @@ def warm_up(
         MemoryError: If the address space is limited, and too little is left.
     """
     begun = time.perf_counter()
+    quicken_flags()
     with announced(on_compile):
-        nothing = new_scores(0, problem.goal_p.shape[1])
-        score_rows(problem, gripper_contacts(problem), no_rows(), nothing)
-        seconds = time.perf_counter() - begun
-        return seconds + (0.0 if approaches is None else approaches.warm_up())
+        with nullcontext() if approaches is None else approaches.compiled_beside():
+            nothing = new_scores(0, problem.goal_p.shape[1])
+            score_rows(problem, gripper_contacts(problem), no_rows(), nothing)
+        if approaches is not None:
+            approaches.warm_up()
+    return time.perf_counter() - begun
