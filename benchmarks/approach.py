@@ -22,7 +22,7 @@ from tcs.motion.approach import SAMPLES, first_accesses
 from tcs.motion.approach_check import ApproachScene
 from tcs.placement.scoring import load_job, sweep, task_environment_pairs
 from tcs.placement.scoring.approaches import approach_lines
-from tcs.placement.scoring.rebuild import rebuild_scene
+from tcs.placement.scoring.rebuild import rebuild_scenes
 from tcs.placement.tables import Reason
 
 TIMED = ("shaving", "wheelchair")
@@ -88,7 +88,7 @@ def share(file: tcs.ScoreFile) -> None:
 
 def compare(file: tcs.ScoreFile, pairs: int, seed: int) -> None:
     """Compare random pairs with the dense scan, and re-check their approaches with Drake."""
-    approaches = ApproachScene.of(*rebuild_scene(file))
+    approaches = ApproachScene.of(*rebuild_scenes(file)[0])
     job, scene = approaches.job, approaches.scene
     scores = file.nominal.scores
     drawn = np.argwhere(scores.reached | np.isin(scores.reason, APPROACH))

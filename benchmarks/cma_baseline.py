@@ -17,7 +17,7 @@ import tcs
 from tcs.kernel.arrays import FloatArray
 from tcs.placement.refinement import PointScorer
 from tcs.placement.refinement.space import Space
-from tcs.placement.tables import Points, tc_manipulability, tc_reachability
+from tcs.placement.tables import tc_manipulability, tc_reachability
 
 POPULATION, POPULATION_WITH_ENVIRONMENT = 1600, 3600
 ITERATIONS, CMEAN = 10, 0.25
@@ -123,7 +123,7 @@ def _evaluated(
     rounded = np.round(members[..., slow] / SLOW_STEP) * SLOW_STEP
     members[..., slow] = np.clip(rounded, space.low[slow], space.high[slow])
     flat = members.reshape(-1, members.shape[-1])
-    found = scorer.score(Points(flat, np.zeros(len(flat), dtype=np.int64)))
+    found = scorer.score(flat)
     shape = (*members.shape[:2], -1)
     weights = file.nominal.sets.weights
     reachability = tc_reachability(found.reached.reshape(shape).any(axis=1), weights)

@@ -26,7 +26,7 @@ from tcs.model.scene import NeighbourList
 from tcs.motion import Stop, accesses
 from tcs.motion.paths import find_path, rounded
 from tcs.motion.recheck import false_pieces
-from tcs.placement.scoring.rebuild import rebuild_scene
+from tcs.placement.scoring.rebuild import rebuild_scenes
 
 AGAIN = 10.0
 """Time after which a query counts as unsolvable [s]."""
@@ -133,7 +133,7 @@ def measure(file: tcs.ScoreFile, name: str, places: int, checked: int, seed: int
 
 def chosen_stops(file: tcs.ScoreFile, places: int, seed: int) -> Iterator[tuple[Stop, list[int]]]:
     """Yield random configurations that reach two goals or more, with those goals."""
-    job, scene, _ = rebuild_scene(file)
+    job, scene, _ = rebuild_scenes(file)[0]
     table = file.nominal_index
     reached = file.tables[table].scores.reached
     rows = np.flatnonzero(reached.sum(axis=1) >= 2)

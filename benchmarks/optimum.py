@@ -43,7 +43,7 @@ from tcs.placement.refinement import refinement_summary
 from tcs.placement.refinement.floor import successes
 from tcs.placement.robustness import PerturbedPoints, Trials
 from tcs.placement.scoring import task_environment_pairs
-from tcs.placement.tables import Points, tc_reachability
+from tcs.placement.tables import tc_reachability
 
 COLUMNS = (
     *("task, environment", "P_R + P_M of the grid", "refined", "gain", "of all sets"),
@@ -174,7 +174,7 @@ def judged_row(folder: Path, options: argparse.Namespace, name: str) -> dict[str
         on_grid(file, table.most_robust(file.nominal.sets)),
         first_set(surest),
     ]
-    points = [Points(values, np.zeros(len(values), dtype=np.int64)) for values in sets]
+    points = [values for values in sets]
     success = [100.0 * value for value in successes(samples, trials.weights, points)]
     found = refinement_summary(refined)
     before, after = (total(found, key) for key in ("before", "after"))

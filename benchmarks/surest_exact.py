@@ -203,7 +203,7 @@ def success_of(here: Row, members: IntArray) -> FloatArray:
 
 def without_arm(trials: Trials) -> Trials:
     """Return trials of a robot whose arm touches nothing but with its gripper."""
-    arm = trials.arms[0]
+    arm = trials.hands[0]
     arrays = arm.lowered.arrays
     of_gripper = (arrays.arm.frame == GRIPPER)[:, None]
     none = arrays._replace(
@@ -212,7 +212,7 @@ def without_arm(trials: Trials) -> Trials:
         arm_vs_environment=arrays.arm_vs_environment & of_gripper,
     )
     lowered = dataclasses.replace(arm.lowered, arrays=none)
-    return dataclasses.replace(trials, arms=(dataclasses.replace(arm, lowered=lowered),))
+    return dataclasses.replace(trials, hands=(dataclasses.replace(arm, lowered=lowered),))
 
 
 def surest_pair(here: Row) -> IntArray:

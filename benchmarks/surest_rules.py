@@ -47,7 +47,7 @@ from tcs.placement.refinement.space import Space
 from tcs.placement.refinement.staged import StagedSamples
 from tcs.placement.refinement.surest import SurestSearch, surest_pairs, surest_triples
 from tcs.placement.robustness import PerturbedPoints, Trials
-from tcs.placement.tables import Points, Reason
+from tcs.placement.tables import Reason
 
 COLUMNS = (
     *("task, environment: rules", "paper, Table I (standard deviation)"),
@@ -110,7 +110,7 @@ GRID = """grid:
 class WithinReach(PerturbedPoints):
     """Samples in which only reach and joint limits count, where the gripper is free."""
 
-    def reached(self, points: Points) -> BoolArray:
+    def reached(self, points: FloatArray) -> BoolArray:
         """Return which goals are within reach of each configuration, shape (n, samples, G)."""
         return ~np.isin(self.reasons(points), (Reason.TOO_FAR, Reason.JOINT_LIMITS))
 

@@ -33,7 +33,6 @@ from tcs.placement.refinement.space import Space
 from tcs.placement.refinement.staged import StagedSamples, best_pairs
 from tcs.placement.refinement.surest import SurestSearch
 from tcs.placement.robustness import PerturbedPoints, Trials
-from tcs.placement.tables import Points
 
 COLUMNS = (
     *("task, environment", "paper, Table I", "refined (standard error)"),
@@ -174,9 +173,9 @@ class SearchFromPoints(SurestSearch):
         return walks
 
 
-def points_of(values: FloatArray) -> Points:
+def points_of(values: FloatArray) -> FloatArray:
     """Return configurations of a robot with one arm."""
-    return Points(values, np.zeros(len(values), dtype=np.int64))
+    return values
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ import tcs
 from tcs.kernel.arrays import FloatArray
 from tcs.placement.robustness import PerturbedPoints, Trials
 from tcs.placement.scoring import task_environment_pairs
-from tcs.placement.tables import Points, tc_reachability
+from tcs.placement.tables import tc_reachability
 
 MEASURE = "jlwki"
 ERRORS = """errors:
@@ -131,7 +131,7 @@ def success(
     samples: PerturbedPoints, weights: FloatArray, values: FloatArray
 ) -> tuple[float, float]:
     """Return the mean of P_R over rooms, and the fraction of rooms with all goals."""
-    found = samples.reached(Points(values, np.zeros(len(values), dtype=np.int64)))
+    found = samples.reached(values)
     reached = np.logical_or.reduce(found, axis=0)
     return float(tc_reachability(reached, weights).mean()), float(reached.all(axis=1).mean())
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import tcs
 from tcs.output.view import SceneObjects, ViewedSet, export_page, open_meshcat
-from tcs.placement.scoring import rebuild_scene
+from tcs.placement.scoring import rebuild_scenes
 
 
 def main(folder: Path = Path("out/examples")) -> None:
@@ -17,7 +17,7 @@ def main(folder: Path = Path("out/examples")) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     file = tcs.score("feeding")
     # The scene is rebuilt from the models of the file; their digest must be the stored one.
-    job, scene, _ = rebuild_scene(file)
+    ((job, scene, _),) = rebuild_scenes(file)
     # Without an observed state, table 0 is the only one.
     viewed = ViewedSet.of(file, 0, tcs.select(file).indices)
     objects = SceneObjects(scene, job.task, viewed, meshes=False)

@@ -53,8 +53,8 @@ def score(
         str | None,
         typer.Option(
             metavar="ARM|both",
-            help="Arm of the robot to score, e.g. left; both: every configuration uses one of "
-            "them, and the members of a set any.",
+            help="Arm of the goals that name none, e.g. left; both: each goal is reached by the "
+            "arm that reaches it best.",
             show_default="that of the robot file",
         ),
     ] = None,
@@ -148,17 +148,10 @@ def score(
         raise typer.BadParameter("give a task, or --all for all tasks.", param_hint="TASK")
     if task is None and (observed or frames):
         raise typer.BadParameter("requires one task, not --all.", param_hint="--observed")
-    if arms and (observed or frames):
+    if dry_run and (observed or frames):
         raise typer.BadParameter(
-            "is not for an observed environment. Give the robot file of one arm with --robot.",
-            param_hint="--arms",
+            "is for an environment that is not observed.", param_hint="--dry-run"
         )
-    if dry_run and (observed or frames or arms):
-        raise typer.BadParameter(
-            "is for one arm and an environment that is not observed.", param_hint="--dry-run"
-        )
-    if tool and (everything or arms):
-        raise typer.BadParameter("is for one task and one arm.", param_hint="--tool")
     kept = options.block_folder(blocks, restart)
     if blocks and (observed or frames):
         raise typer.BadParameter("is not for an observed environment.", param_hint="--blocks")
@@ -200,7 +193,7 @@ def score(
         "on_compile": terminal.note_compiling,
     }
     if dry_run:
-        rows = files.estimate_all(task, environment, robot, **scoring_options)
+        rows = files.estimate_all(task, environment, robot, arms=arms, **scoring_options)
         terminal.print_result({"rows": rows}, tables.report_estimates, as_json=as_json)
         return
     if task is None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from dataclasses import dataclass
 from functools import partial
@@ -206,8 +205,8 @@ def explain(
     arm: Annotated[
         str | None,
         typer.Option(
-            help="Arm to explain with --here, in a file of both arms.",
-            show_default="the first that reaches the goal",
+            help="Arm to explain, in a file of both arms.",
+            show_default="the one that reaches the goal, or comes nearest to it",
         ),
     ] = None,
     costs: _ChangeCosts,
@@ -224,8 +223,8 @@ def explain(
     """Explain why a goal is not reached, and find the cheapest change that reaches it."""
     if configuration is not None and here is not None:
         raise typer.BadParameter("give --configuration or --here, not both.", param_hint="--here")
-    if here is None and (at or torso or arm):
-        raise typer.BadParameter("--torso, --at and --arm require --here.", param_hint="--here")
+    if here is None and (at or torso):
+        raise typer.BadParameter("--torso and --at require --here.", param_hint="--here")
 
     import tcs
     from tcs.cli.values import current_state, frame_values, observed_settings
@@ -238,9 +237,7 @@ def explain(
     explanation = tcs.explain(
         loaded,
         goal_index_of_number(loaded, goal),
-        configuration
-        if here is None
-        else dataclasses.replace(current_state(here, torso, at or ()), arm=arm),
+        configuration if here is None else current_state(here, torso, at or ()),
         weights=fix_weights(
             Grid.from_dict(loaded.grid),
             metre=costs.metre_weight,
@@ -252,5 +249,9 @@ def explain(
         observed=observed_settings(observed or (), loaded.observed_axes),
         frames=frame_values(frames or ()),
     )
+    if arm is not None:
+        from tcs.placement.refinement.by_arm import explained_by_arm
+
+        explanation = explained_by_arm(explanation, arm)
     result = explanation_in_words(loaded, explanation)
     terminal.print_result(result, report_explanation, as_json=as_json)

@@ -163,11 +163,11 @@ class _Stored(NamedTuple):
     """A stored posture at a goal."""
 
     table: int
-    arm: int
-    """Number of the arm, 0 in a file of one."""
+    hand: int
+    """Number of the hand."""
     goal: int
     place: int | FloatArray
-    """Flat index of the configuration among those of its arm, or the values of its axes."""
+    """Flat index of the configuration, or the values of its axes."""
     q: FloatArray
     """Joint angles [rad], shape (7,)."""
 
@@ -223,11 +223,12 @@ def _drawn(file: ScoreFile, pairs: int, random: np.random.Generator) -> Iterator
         for table, tables in enumerate(file.tables)
         for h, g in np.argwhere(tables.scores.reached)
     ]
-    size = file.configurations.arm_size
     for n in sorted(random.permutation(len(reached))[:pairs].tolist()):
         table, h, g = reached[n]
-        q = np.asarray(file.tables[table].scores.joints_of(h, g), dtype=np.float64)
-        yield _Stored(table, h // size, g, h % size, q)
+        scores = file.tables[table].scores
+        q = np.asarray(scores.joints_of(h, g), dtype=np.float64)
+        hand = 0 if scores.hand is None else int(scores.hand[h, g])
+        yield _Stored(table, hand, g, h, q)
 
 
 def _drawn_refined(file: ScoreFile, pairs: int, random: np.random.Generator) -> Iterator[_Stored]:
@@ -238,29 +239,26 @@ def _drawn_refined(file: ScoreFile, pairs: int, random: np.random.Generator) -> 
         if tables.refined is not None
         for at in np.argwhere(tables.refined.reached)
     ]
-    size = file.configurations.arm_size
     for n in sorted(random.permutation(len(reached))[:pairs].tolist()):
         table, row, member, g = reached[n]
         refined = file.tables[table].refined
         assert refined is not None
         q = np.asarray(refined.arm_joints[row, member, g], dtype=np.float64)
-        arm = int(refined.origin[row, member]) // size
-        yield _Stored(table, arm, g, refined.values[row, member], q)
+        hand = 0 if refined.hand is None else int(refined.hand[row, member, g])
+        yield _Stored(table, hand, g, refined.values[row, member], q)
 
 
 def _finding(
     file: ScoreFile, scenes: Sequence[ApproachScene], stored: _Stored
 ) -> ApproachFinding | None:
-    """Return the finding on the approach of a stored posture, given the scene of each arm or hand.
+    """Return the finding on the approach of a stored posture, given the scene of each hand.
 
     None if no approach is found from it.
     """
-    scene, goal = scenes[stored.arm], stored.goal
-    if file.hands:
-        scene = next(scene for scene in scenes if goal in scene.job.goal_numbers)
-        goal = scene.job.goal_numbers.index(goal)
+    scene = scenes[stored.hand]
+    goal = file.goals_of_hands[stored.hand].index(stored.goal)
     if isinstance(stored.place, int):
-        number = stored.table * file.configurations.arm_size + stored.place
+        number = stored.table * file.configurations.size + stored.place
         return scene.check(number, goal, stored.q)
     return scene.at(stored.place, file.observed_states[stored.table]).check(0, goal, stored.q)
 

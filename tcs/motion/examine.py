@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -28,8 +28,8 @@ from tcs.kernel.motion.trees import Trees, new_trees
 from tcs.motion.approach import Access, accesses, first_accesses
 from tcs.motion.kept_outcomes import KeptOutcomes, Outcomes, outcomes_key, table_of
 from tcs.motion.stops import BodyPair, Stop, StopGrid
-from tcs.placement.scoring.rebuild import rebuild_scene
-from tcs.placement.store import MotionFile, ScoreFile, files_of_arms
+from tcs.placement.scoring.rebuild import rebuild_scenes
+from tcs.placement.store import MotionFile, ScoreFile
 from tcs.placement.tables import MotionOutcome, MotionTable, SetTable
 
 FIRST_SAMPLES = 24
@@ -84,14 +84,17 @@ def examine(
         raise TcsError(f"jobs is {jobs}; must be 1 or more threads.")
     begun, processor = time.perf_counter(), time.process_time()
     number = file.nominal_index if table is None else table
-    built = [rebuild_scene(of_arm) for of_arm in files_of_arms(file)]
+    built = rebuild_scenes(file)
     sets = file.tables[number].sets
     rows = drawn(worth_examining(sets, within, most), sample, seed)
-    arms = [StopGrid.of(job, scene, job.scored_grid, lowered) for job, scene, lowered in built]
-    with opened_if(blocks, lambda: outcomes_key(arms, seed)) as opened:
+    hands = [
+        _Hand(StopGrid.of(job, scene, job.scored_grid, lowered), goals)
+        for (job, scene, lowered), goals in zip(built, file.goals_of_hands, strict=True)
+    ]
+    with opened_if(blocks, lambda: outcomes_key([h.stops for h in hands], seed)) as opened:
         kept = None if opened is None else KeptOutcomes(opened, number)
         with announced(on_compile):
-            outcomes = _examined(arms, sets, rows, number, seed, jobs, kept, on_progress)
+            outcomes = _examined(hands, sets, rows, number, seed, jobs, kept, on_progress)
     examined = table_of(sets.candidates[rows], outcomes, sets.weights.size)
     tables: list[MotionTable | None] = [None] * len(file.tables)
     tables[number] = examined
@@ -208,8 +211,16 @@ def drawn(rows: NDArray[np.intp], sample: int | None, seed: int) -> NDArray[np.i
     return np.sort(np.random.default_rng(seed).choice(rows, sample, replace=False))
 
 
+class _Hand(NamedTuple):
+    """The robot with one hand."""
+
+    stops: StopGrid
+    goals: tuple[int, ...]
+    """Numbers of the goals that the hand may serve."""
+
+
 def _examined(
-    arms: Sequence[StopGrid],
+    hands: Sequence[_Hand],
     sets: SetTable,
     rows: NDArray[np.intp],
     table: int,
@@ -233,31 +244,41 @@ def _examined(
     for number, slice_ in enumerate(slices):
         if kept is None:
             break
-        before = kept.load(sets.candidates[slice_], sets.reached[slice_])
+        before = kept.load(sets.candidates[slice_], sets.served[slice_])
         if before is not None:
             add(number, before)
     missing = [number for number in range(len(slices)) if number not in found]
-    work = (delayed(_examine_slice)(arms, sets, slices[number], table, seed) for number in missing)
+    work = (delayed(_examine_slice)(hands, sets, slices[number], table, seed) for number in missing)
     parallel = Parallel(jobs, prefer="threads", return_as="generator")
     for number, outcomes in zip(missing, parallel(work), strict=True):
         slice_ = slices[number]
         if kept is not None:
-            kept.save(sets.candidates[slice_], sets.reached[slice_], outcomes)
+            kept.save(sets.candidates[slice_], sets.served[slice_], outcomes)
         add(number, outcomes)
     return list(itertools.chain.from_iterable(found[number] for number in range(len(slices))))
 
 
 def _examine_slice(
-    arms: Sequence[StopGrid], sets: SetTable, rows: NDArray[np.intp], table: int, seed: int
+    hands: Sequence[_Hand], sets: SetTable, rows: NDArray[np.intp], table: int, seed: int
 ) -> list[Outcomes]:
-    """Examine some candidates of a table, given by its number, with the stops of each arm."""
+    """Examine some candidates of a table, given by its number, each goal by the hand that serves.
+
+    The other arms are parked meanwhile.
+    """
     trees = new_trees(seed)
-    outcomes = []
+    found = []
     for row in rows:
-        arm, h = divmod(int(sets.candidates[row]), sets.arm_size)
-        configuration = table * sets.arm_size + h
-        outcomes.append(_examine_stop(arms[arm], configuration, sets.reached[row], trees, seed))
-    return outcomes
+        outcomes: Outcomes = [(MotionOutcome.UNREACHED, None)] * sets.weights.size
+        for number, hand in enumerate(hands):
+            served = sets.served[row, list(hand.goals)] == number + 1
+            if not served.any():
+                continue
+            configuration = table * hand.stops.job.grid.size + int(sets.candidates[row])
+            of_hand = _examine_stop(hand.stops, configuration, served, trees, seed)
+            for place in np.flatnonzero(served):
+                outcomes[hand.goals[place]] = of_hand[place]
+        found.append(outcomes)
+    return found
 
 
 def _examine_stop(

@@ -63,21 +63,28 @@ def plan_csv(plan: MotionPlan) -> str:
 
     Columns: `stop` and `segment`, counted from 0; `type`; `from` and `to`, numbers of goals or
     "rest"; `time` since the begin of the stop's tour [s]; the position of each joint [rad]; its
-    velocity [rad/s] under its name with the suffix `_velocity`.
+    velocity [rad/s] under its name with the suffix `_velocity`. Joints of an arm that is parked
+    meanwhile are empty.
     """
     out = io.StringIO()
     rows = csv.writer(out, lineterminator="\n")
-    velocities = [f"{name}_velocity" for name in plan.joints]
-    rows.writerow(["stop", "segment", "type", "from", "to", "time", *plan.joints, *velocities])
+    names = tuple(dict.fromkeys(name for stop in plan.stops for name in plan.joints_of(stop)))
+    names = names or plan.joints
+    velocities = [f"{name}_velocity" for name in names]
+    rows.writerow(["stop", "segment", "type", "from", "to", "time", *names, *velocities])
     for number, stop in enumerate(plan.stops):
         begin = 0.0
+        columns = [names.index(name) for name in plan.joints_of(stop)]
         for index, segment in enumerate(stop.segments):
             ends = ["rest" if end is None else end for end in (segment.start, segment.end)]
             head = [number, index, segment.type, *ends]
             timing = segment.timing
             samples = zip(timing.times, timing.positions, timing.velocities, strict=True)
             for at, q, v in samples:
-                rows.writerow([*head, f"{begin + at:.9f}", *q.tolist(), *v.tolist()])
+                cells: list[object] = [""] * (2 * len(names))
+                for column, position, rate in zip(columns, q.tolist(), v.tolist(), strict=True):
+                    cells[column], cells[len(names) + column] = position, rate
+                rows.writerow([*head, f"{begin + at:.9f}", *cells])
             begin += timing.duration
     return out.getvalue()
 
@@ -102,7 +109,7 @@ def plan_messages(plan: MotionPlan, *, ros: int = 2) -> str:
         rows = zip(found.times, found.positions, found.velocities, strict=True)
         message = {
             "header": {"seq": 0, **begin} if ros == 1 else begin,
-            "joint_names": list(plan.joints),
+            "joint_names": list(plan.joints_of(stop)),
             "points": [{**_point(q, v), "time_from_start": _time(t, ros)} for t, q, v in rows],
         }
         # JSON is YAML, and much faster to write.
@@ -128,13 +135,16 @@ def plan_arrays(plan: MotionPlan) -> bytes:
     """Return the trajectory of each stop as arrays in numpy's format.
 
     `joints`; for stop number N with motions `breaks_N` [s], shape (n,), `samples_N` [rad] and
-    `samples_dot_N` [rad/s], shapes (7, n), as `PiecewisePolynomial.CubicHermite` of Drake takes.
+    `samples_dot_N` [rad/s], shapes (7, n), as `PiecewisePolynomial.CubicHermite` of Drake takes;
+    in a plan of several hands `joints_N` as well.
     """
     arrays: dict[str, Any] = {"joints": np.array(plan.joints)}
     for number, stop in enumerate(plan.stops):
         if stop.segments:
             found = stop.samples()
             arrays[f"breaks_{number}"] = found.times
+            if stop.joints:
+                arrays[f"joints_{number}"] = np.array(stop.joints)
             arrays[f"samples_{number}"] = found.positions.T
             arrays[f"samples_dot_{number}"] = found.velocities.T
     buffer = io.BytesIO()

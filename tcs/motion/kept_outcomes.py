@@ -21,21 +21,21 @@ Outcomes = list[tuple[MotionOutcome, BodyPair | None]]
 """What becomes of each goal from one configuration, and the bodies that are in the way."""
 
 
-def outcomes_key(arms: Sequence[StopGrid], seed: int) -> str:
+def outcomes_key(hands: Sequence[StopGrid], seed: int) -> str:
     """Return the hash of what the outcomes at all configurations follow from.
 
     Args:
-        arms: The stops of each arm.
+        hands: The stops of each hand.
         seed: Seed of the planner.
     """
     sha = hashlib.sha256(f"motions\0{program_digest()}\0{seed}\0".encode())
-    for arm in arms:
-        spec = arm.job.spec
+    for hand in hands:
+        spec = hand.job.spec
         documents = (spec.robot.model_dump_json(), spec.environment.model_dump_json())
-        for text in (repr(arm.job.task), *documents):
+        for text in (repr(hand.job.task), *documents):
             sha.update(text.encode() + b"\0")
-        sha.update(arm.lowered.digest().encode())
-        for rates in (arm.rests, arm.velocity, arm.acceleration):
+        sha.update(hand.lowered.digest().encode())
+        for rates in (hand.rests, hand.velocity, hand.acceleration):
             sha.update(np.asarray(rates, dtype="<f8").tobytes())
     return sha.hexdigest()
 
@@ -49,18 +49,18 @@ class KeptOutcomes:
     """Number of the table of the score file."""
 
     def load(
-        self, configurations: NDArray[np.int32], reached: NDArray[np.bool_]
+        self, configurations: NDArray[np.int32], served: NDArray[np.uint8]
     ) -> list[Outcomes] | None:
         """Return the outcomes at configurations; None if they have to be examined.
 
         Args:
             configurations: Flat indices, shape (n,).
-            reached: The goals that each reaches, shape (n, goals).
+            served: Number of the hand at each goal plus 1, 0 for none, shape (n, goals).
         """
 
         def decode(content: dict[str, Any]) -> list[Outcomes]:
-            outcome = decompress(content, "outcome", "u1", reached.shape)
-            pair = decompress(content, "pair", "u4", reached.shape).astype(np.int64) - 1
+            outcome = decompress(content, "outcome", "u1", served.shape)
+            pair = decompress(content, "pair", "u4", served.shape).astype(np.int64) - 1
             names = content.get("names")
             if not isinstance(names, list) or not all(map(_is_pair, names)):
                 raise StoreFormatError("has no names of bodies")
@@ -72,12 +72,12 @@ class KeptOutcomes:
                 for of_row in zip(outcome.tolist(), pair.tolist(), strict=True)
             ]
 
-        return self.blocks.load(self._name(configurations, reached), decode)
+        return self.blocks.load(self._name(configurations, served), decode)
 
     def save(
         self,
         configurations: NDArray[np.int32],
-        reached: NDArray[np.bool_],
+        served: NDArray[np.uint8],
         outcomes: list[Outcomes],
     ) -> None:
         """Write the outcomes at configurations.
@@ -85,19 +85,19 @@ class KeptOutcomes:
         Raises:
             OutputError: If they cannot be written.
         """
-        found = table_of(configurations, outcomes, reached.shape[1])
+        found = table_of(configurations, outcomes, served.shape[1])
         content = {
             "outcome": compress(found.outcome),
             # Arrays are stored without a sign.
             "pair": compress((found.pair + 1).astype(np.uint32)),
             "names": [list(pair) for pair in found.pair_names],
         }
-        self.blocks.save(self._name(configurations, reached), content)
+        self.blocks.save(self._name(configurations, served), content)
 
-    def _name(self, configurations: NDArray[np.int32], reached: NDArray[np.bool_]) -> str:
+    def _name(self, configurations: NDArray[np.int32], served: NDArray[np.uint8]) -> str:
         sha = hashlib.sha256(f"{self.table}\0".encode())
         sha.update(np.asarray(configurations, dtype="<i8").tobytes())
-        sha.update(np.packbits(reached).tobytes())
+        sha.update(served.tobytes())
         return sha.hexdigest()[:24]
 
 

@@ -98,6 +98,10 @@ class StopPlan:
     """In order, from rest to rest; empty if no goal can be done."""
     returns: bool
     """Whether a motion back to rest was found."""
+    hand: str = ""
+    """Name of the hand that makes the tour; "" in a plan of one."""
+    joints: tuple[str, ...] = ()
+    """Names of its joints, in a plan of several hands."""
 
     @property
     def goals(self) -> tuple[int, ...]:
@@ -123,6 +127,7 @@ class StopPlan:
         """Return the stop as plain containers."""
         return {
             **self.at.to_json(),
+            **({"hand": self.hand, "joints": list(self.joints)} if self.hand else {}),
             "configuration": self.index,
             "goals": list(self.goals),
             "returns": self.returns,
@@ -152,6 +157,10 @@ class MotionPlan:
     """Duration of planning, timing and re-check [s]."""
     jerk_limits: tuple[float, ...] | None = None
     """Greatest jerk of each joint [rad/s^3], inf where there is none; None without limits."""
+
+    def joints_of(self, stop: StopPlan) -> tuple[str, ...]:
+        """Return the names of the joints of a stop, in the order of its joint arrays."""
+        return stop.joints or self.joints
 
     @property
     def goals_done(self) -> int:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from tcs.errors import StoreFormatError
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.motion.straight import OFF_LINE
-from tcs.model.scene import goal_poses
+from tcs.model.scene import Scene, goal_poses
 from tcs.model.tasks import TOOL_SPEED
 from tcs.motion.cubics import at_times, extremes
 from tcs.motion.curves import CHAIN
@@ -96,22 +96,22 @@ def check_plan(
         StoreMismatchError: If the models have changed since the plan was made.
         StoreFormatError: If it names goals, joints or axes that its scene does not have.
     """
-    job, scene = rebuild_made_from(plan.made_from)
-    check_names(plan, job)
+    hands = hands_of(plan)
     total, done = sum(len(stop.segments) for stop in plan.stops), 0
-    check = None
+    checks: dict[str, StopCheck] = {}
     edges = false = jumps = goals = 0
     error = velocity = acceleration = jerk = speed = off_line = 0.0
     for planned in plan.stops:
-        stop = stop_of(plan, planned, job, scene)
-        check = StopCheck(stop, check)
+        hand = hands[planned.hand]
+        stop = stop_of(plan, planned, hand.job, hand.scene)
+        check = checks[planned.hand] = StopCheck(stop, checks.get(planned.hand))
         jumps += _jumps(planned, stop)
         for segment in planned.segments:
             edges += segment.edges
             false += check.false_pieces(segment)
             if segment.type == "approach":
                 goals += 1
-                error = max(error, _position_error(segment, stop))
+                error = max(error, _position_error(segment, stop, hand.goals))
             if segment.type != "move":
                 measured = _tool(segment.timing, stop)
                 speed, off_line = max(speed, measured[0]), max(off_line, measured[1])
@@ -132,22 +132,58 @@ def check_plan(
     )
 
 
+class PlanHand(NamedTuple):
+    """A hand of a plan, in the scene that it was made for."""
+
+    job: Job
+    scene: Scene
+    goals: tuple[int, ...]
+    """Numbers of the goals that it may serve."""
+
+
+def hands_of(plan: MotionPlan, *, meshes: bool = False) -> dict[str, PlanHand]:
+    """Return the hands of a plan, by the name in its stops.
+
+    Args:
+        plan: The plan.
+        meshes: Whether to load the robot's visual meshes, for display; this takes seconds.
+
+    Raises:
+        StoreMismatchError: If the models have changed since the plan was made.
+        StoreFormatError: If it names hands, goals, joints or axes that its scene does not have.
+    """
+    built = rebuild_made_from(plan.made_from, meshes=meshes)
+    if len(built) == 1:
+        (job, scene) = built[0]
+        found = {"": PlanHand(job, scene, tuple(range(len(job.task.goals))))}
+    else:
+        found = {job.hand.name: PlanHand(job, scene, job.goal_numbers) for job, scene in built}
+    _check_names(plan, found)
+    return found
+
+
 def stop_of(plan: MotionPlan, planned: StopPlan, job: Job, scene: Any) -> Stop:
     """Return the stop of a plan, the live scene set to it."""
     values = [value_of(planned.at, axis.name) for axis in job.scored_grid.axes]
     return Stop.at_values(job, scene, values, plan.seed)
 
 
-def check_names(plan: MotionPlan, job: Job) -> None:
-    """Check that a plan names the joints, axes and goals of its scene.
+def _check_names(plan: MotionPlan, hands: Mapping[str, PlanHand]) -> None:
+    """Check that a plan names the hands, joints, axes and goals of its scene.
 
     Raises:
         StoreFormatError: If it does not.
     """
-    if plan.joints != tuple(job.spec.robot.arm_joints):
-        raise StoreFormatError("The plan names other joints than the scored arm has. Plan again.")
-    axes = {axis.name for axis in job.scored_grid.axes}
+    first = next(iter(hands.values())).job
+    axes = {axis.name for axis in first.scored_grid.axes}
     for stop in plan.stops:
+        if stop.hand not in hands:
+            raise StoreFormatError("The plan names hands that its task does not have. Plan again.")
+        hand = hands[stop.hand]
+        if (stop.joints or plan.joints) != tuple(hand.job.spec.robot.arm_joints):
+            raise StoreFormatError(
+                "The plan names other joints than the scored arm has. Plan again."
+            )
         named = {
             "base_x",
             "base_y",
@@ -161,7 +197,7 @@ def check_names(plan: MotionPlan, job: Job) -> None:
             )
         for segment in stop.segments:
             for goal in (segment.start, segment.end):
-                if goal is not None and not 0 <= goal < len(job.task.goals):
+                if goal is not None and goal not in hand.goals:
                     raise StoreFormatError(f"The plan names goal {goal}, which does not exist.")
             if segment.type == "approach" and segment.end is None:
                 raise StoreFormatError("The plan has an approach to rest. Plan again.")
@@ -223,15 +259,16 @@ def _tool(timing: Timed, stop: Stop) -> tuple[float, float]:
     return max(*coarse, *fine), max(off)
 
 
-def _position_error(segment: Segment, stop: Stop) -> float:
+def _position_error(segment: Segment, stop: Stop, goals: Sequence[int]) -> float:
     """Return the distance of the tool from its goal at the end of an approach [m].
 
     Of a free goal it is the distance from the nearest pose that serves, or the angle [rad].
     """
     scene, task = stop.scene, stop.job.task
+    number = goals.index(segment.end or 0)
     scene.set_arm(segment.timing.positions[-1])
-    X_GT = goal_poses(scene, task)[segment.end or 0].inverse() @ scene.tool_pose()
-    free = task.goals[segment.end or 0].free
+    X_GT = goal_poses(scene, task)[number].inverse() @ scene.tool_pose()
+    free = task.goals[number].free
     if free is not None:
         return max(free.errors(X_GT.rotation().matrix(), X_GT.translation()))
     return float(np.linalg.norm(X_GT.translation()))

@@ -17,10 +17,10 @@ from tcs.errors import TcsError
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.motion.edges import certified
 from tcs.kernel.motion.trees import new_trees
-from tcs.model.scene import LoweredScene, Scene, lower
+from tcs.model.scene import LoweredScene, lower
 from tcs.model.scene.lowering import environment_at
 from tcs.motion.motion_plan import MotionPlan, Segment, StopPlan
-from tcs.motion.plan_check import check_names
+from tcs.motion.plan_check import PlanHand, hands_of
 from tcs.motion.plans import value_of
 from tcs.motion.stop_tour import plan_stop
 from tcs.motion.stops import BodyPair, Stop, StopGrid, single_grid
@@ -28,8 +28,6 @@ from tcs.placement.robustness import ErrorModel, Mean, mean_of
 from tcs.placement.robustness.body_collisions import base_bodies
 from tcs.placement.robustness.displacements import displaced
 from tcs.placement.robustness.trials import Errors, Progress
-from tcs.placement.scoring.job import Job
-from tcs.placement.scoring.rebuild import rebuild_made_from
 
 _STREAM = "plan"
 """Name of the draw of errors."""
@@ -110,17 +108,18 @@ def evaluate_plan(
         TcsError: If the plan has no motion, no joint has an error, or a number is out of range.
     """
     begun = time.perf_counter()
-    job, scene = rebuild_made_from(plan.made_from)
-    check_names(plan, job)
+    hands = hands_of(plan)
     stops = [planned for planned in plan.stops if planned.segments]
     if not stops:
         raise TcsError("The plan has no motions, so there is nothing to evaluate.")
-    model = ErrorModel.of(scene, errors)
+    model = ErrorModel.of(next(iter(hands.values())).scene, errors)
     offsets = model.draw(samples, seed, stream=_STREAM)
     # Those with motions first; the others are tried for goals that are lost there.
     stops += [planned for planned in plan.stops if not planned.segments]
-    places = [_Place.of(planned, job, scene) for planned in stops]
-    displacements = [displaced(job, scene, place.nominal, offsets) for place in places]
+    places = [_Place.of(planned, hands[planned.hand]) for planned in stops]
+    displacements = [
+        displaced(place.hand.job, place.hand.scene, place.nominal, offsets) for place in places
+    ]
     jerk = None if plan.jerk_limits is None else np.array(plan.jerk_limits)
     doing = sum(bool(planned.segments) for planned in stops)
     blind = np.zeros((samples, doing), dtype=np.bool_)
@@ -131,11 +130,11 @@ def evaluate_plan(
             blind[i, number] = _is_free(stop, place.planned)
             if not replan:
                 continue
-            lost = set(place.planned.goals) - _done(stop, place.planned.goals, jerk)
+            lost = set(place.planned.goals) - place.done(stop, place.planned.goals, jerk)
             for other, elsewhere in enumerate(places):
                 if lost and other != number:
                     stop = elsewhere.displaced(_sample(displacements[other], i), seed)
-                    lost -= _done(stop, sorted(lost), jerk)
+                    lost -= elsewhere.done(stop, sorted(lost), jerk)
             again[i, number] = not lost
         if on_progress is not None:
             on_progress(i + 1, samples)
@@ -155,8 +154,7 @@ class _Place:
     """A stop of a plan, lowered without errors."""
 
     planned: StopPlan
-    job: Job
-    scene: Scene
+    hand: PlanHand
     lowered: LoweredScene
     stops: StopGrid
     values: Mapping[str, float]
@@ -165,8 +163,9 @@ class _Place:
     """The base and the furniture, which may touch."""
 
     @classmethod
-    def of(cls, planned: StopPlan, job: Job, scene: Scene) -> _Place:
+    def of(cls, planned: StopPlan, hand: PlanHand) -> _Place:
         """Lower the scene at a stop of a plan."""
+        job, scene, _ = hand
         axes = job.scored_grid.axes
         values = {axis.name: value_of(planned.at, axis.name) for axis in axes}
         grid = single_grid(axes, list(values.values()))
@@ -177,7 +176,7 @@ class _Place:
         ]
         ignored = frozenset(itertools.product(base_bodies(scene), furniture))
         stops = StopGrid.of(job, scene, grid, lowered)
-        return cls(planned, job, scene, lowered, stops, values, ignored)
+        return cls(planned, hand, lowered, stops, values, ignored)
 
     @property
     def nominal(self) -> dict[str, float]:
@@ -188,24 +187,26 @@ class _Place:
 
     def displaced(self, state: Mapping[str, float], seed: int) -> Stop:
         """Return the stop with the environment's joints at some positions, the live scene too."""
-        arrays = environment_at(self.lowered, self.scene, self.job.task, [state])
+        scene = self.hand.scene
+        arrays = environment_at(self.lowered, scene, self.hand.job.task, [state])
         lowered = dataclasses.replace(self.lowered, arrays=arrays)
         stop = self.stops.with_environment(lowered).stop(0, new_trees(seed))
         stop = dataclasses.replace(stop, ignored=self.ignored)
         stop.place({**self.values, **state})
         for name, value in state.items():
-            self.scene.set_joint(name, value)
+            scene.set_joint(name, value)
         return stop
+
+    def done(self, stop: Stop, goals: Sequence[int], jerk: FloatArray | None) -> set[int]:
+        """Return the goals to which motions are found from the displaced stop."""
+        of_hand = self.hand.goals
+        served = [of_hand.index(goal) for goal in goals if goal in of_hand]
+        return {of_hand[goal] for goal in plan_stop(stop, None, 0, served, jerk=jerk)[0].goals}
 
 
 def _sample(displacements: tuple[Mapping[str, FloatArray], Any], i: int) -> dict[str, float]:
     """Return the positions of the environment's joints in a sample [m or rad]."""
     return {name: float(values[i]) for name, values in displacements[0].items()}
-
-
-def _done(stop: Stop, goals: Sequence[int], jerk: FloatArray | None) -> set[int]:
-    """Return the goals to which motions are found."""
-    return set(plan_stop(stop, None, 0, goals, jerk=jerk)[0].goals)
 
 
 def _is_free(stop: Stop, planned: StopPlan) -> bool:

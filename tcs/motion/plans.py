@@ -9,18 +9,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.errors import SelectionError, TcsError, UnknownNameError
+from tcs.errors import TcsError, UnknownNameError
 from tcs.kernel.cache import announced
-from tcs.model.grid import Grid, InitialConfiguration
+from tcs.model.grid import InitialConfiguration
 from tcs.model.robots import LEAST_JERK, MOST_JERK
-from tcs.motion.motion_plan import GoalResult, MotionPlan
+from tcs.motion.motion_plan import GoalResult, MotionPlan, StopPlan
 from tcs.motion.recheck import StopCheck
 from tcs.motion.stop_tour import ORDERS, plan_stop
 from tcs.motion.stops import Stop
 from tcs.placement.scoring.job import Job
-from tcs.placement.scoring.rebuild import made_from, rebuild_scene
+from tcs.placement.scoring.rebuild import made_from, rebuild_scenes
 from tcs.placement.selection import Choice
-from tcs.placement.store import ScoreFile, file_of_arm
+from tcs.placement.store import ScoreFile
 from tcs.placement.tables import RefinedSet
 
 PLANNED = 0.5
@@ -41,7 +41,9 @@ def plan(
 
     At each stop the arm goes from its rest posture to the first goal, straight in along its
     approach, straight out along its retreat, on to the next goal, and back to rest. The other arm
-    and the torso do not move. Every curve is certified free of contact and re-checked with Drake.
+    and the torso do not move; where several hands serve the goals of a stop, each of them makes a
+    tour in turn while the other arm is parked. Every curve is certified free of contact and
+    re-checked with Drake.
 
     Args:
         file: A score file.
@@ -66,8 +68,6 @@ def plan(
         UnknownNameError: If there is no such order.
         TcsError: If there is no such configuration, it lacks an axis, or the jerk is out of its
             range.
-        SelectionError: If the file is of several arms, and the configurations use more than one,
-            or one is not given by its number.
     """
     begun = time.perf_counter()
     if order not in ORDERS:
@@ -76,61 +76,88 @@ def plan(
         raise TcsError(
             f"plan: the jerk is {jerk:g} rad/s^3, but must be in [{LEAST_JERK:g}, {MOST_JERK:g}]."
         )
-    numbers: Sequence[int] | None = None
     if isinstance(members, Choice) and members.refined is not None:
         table = 0 if members.match is None else members.match.index
         members = RefinedSet(table, members.refined, members.order)
-    whole = file
+    built = rebuild_scenes(file)
+    job = built[0][0]
+    limits = np.minimum(
+        [of_hand.spec.robot.arm_jerks() for of_hand, *_ in built], np.inf if jerk is None else jerk
+    )
     if isinstance(members, RefinedSet):
-        file = _file_of_refined(file, members)
-    elif file.arms:
-        numbers = _numbers(file, members)
-        file, members = _of_one_arm(file, numbers)
-    job, scene, _ = rebuild_scene(file)
-    limits = np.minimum(job.spec.robot.arm_jerks(), np.inf if jerk is None else jerk)
-    if isinstance(members, RefinedSet):
-        places, serving = _refined_places(whole, job, members)
+        places, serving = _refined_places(file, job, members)
     else:
         places, serving = _places(file, job, members)
     results: dict[int, GoalResult] = {
         goal: GoalResult(goal, None, False, "unreached")
-        for goal in range(len(job.task.goals))
+        for goal in range(len(serving))
         if not serving[goal]
     }
-    stops, edges, false, check = [], 0, 0, None
-    for number, (h, values) in enumerate(places):
+    visits = [(number, hand) for number in range(len(places)) for hand in range(len(built))]
+    stops: list[StopPlan] = []
+    edges, false = 0, 0
+    checks: dict[int, StopCheck] = {}
+    for done, (number, hand) in enumerate(visits):
+        (of_hand, scene, _), of_goals = built[hand], file.goals_of_hands[hand]
         goals = [
             goal
             for goal, able in enumerate(serving)
-            if number in able
+            if (number, hand) in able
             and not (goal in results and results[goal].done)
             # The most dexterous stop serves a goal; later stops take over what it could not do.
-            and (able[0] == number or goal in results)
+            and (able[0] == (number, hand) or goal in results)
         ]
-        index = h if numbers is None else numbers[number]
-        report = _StopProgress(on_progress, number, len(places))
+        if not goals and len(built) > 1:
+            continue
+        index, values = places[number]
+        report = _StopProgress(on_progress, done, len(visits))
         with announced(on_compile):
-            stop = Stop.at_values(job, scene, values, seed)
-            planned, found = plan_stop(stop, index, number, goals, order, limits, report.planned)
+            stop = Stop.at_values(of_hand, scene, values, seed)
+            of_stop = [of_goals.index(goal) for goal in goals]
+            planned, found = plan_stop(
+                stop, index, len(stops), of_stop, order, limits[hand], report.planned
+            )
+        planned, found = _of_task(planned, found, of_goals)
         results |= {result.goal: result for result in found}
+        if file.hands:
+            planned = replace(
+                planned, hand=file.hand_names[hand], joints=tuple(of_hand.spec.robot.arm_joints)
+            )
         stops.append(planned)
-        check = StopCheck(stop, check)
+        checks[hand] = StopCheck(stop, checks.get(hand))
         edges += sum(segment.edges for segment in planned.segments)
-        for done, segment in enumerate(planned.segments, 1):
-            false += check.false_pieces(segment)
-            report.checked(done / len(planned.segments))
+        for part, segment in enumerate(planned.segments, 1):
+            false += checks[hand].false_pieces(segment)
+            report.checked(part / len(planned.segments))
         report.checked(1.0)
     return MotionPlan(
         made_from=made_from(file),
         joints=tuple(job.spec.robot.arm_joints),
         stops=tuple(stops),
-        results=tuple(results[goal] for goal in range(len(job.task.goals))),
+        results=tuple(results[goal] for goal in range(len(serving))),
         edges=edges,
         false=false,
         seed=seed,
         seconds=time.perf_counter() - begun,
-        jerk_limits=tuple(limits.tolist()) if np.any(np.isfinite(limits)) else None,
+        jerk_limits=tuple(limits[0].tolist()) if np.any(np.isfinite(limits)) else None,
     )
+
+
+def _of_task(
+    planned: StopPlan, found: Sequence[GoalResult], goals: Sequence[int]
+) -> tuple[StopPlan, list[GoalResult]]:
+    """Return the plan of a stop with the numbers of the goals in the task, not of the hand."""
+
+    def number(goal: int | None) -> int | None:
+        return None if goal is None else goals[goal]
+
+    segments = tuple(
+        replace(segment, start=number(segment.start), end=number(segment.end))
+        for segment in planned.segments
+    )
+    return replace(planned, segments=segments), [
+        replace(result, goal=goals[result.goal]) for result in found
+    ]
 
 
 @dataclass(frozen=True)
@@ -152,68 +179,26 @@ class _StopProgress:
             self.on_progress(round(100 * (self.stop + fraction) / self.stops), 100)
 
 
-def _numbers(
-    file: ScoreFile, members: Choice | Sequence[int] | InitialConfiguration
-) -> Sequence[int]:
-    """Return the flat indices of the stops in a file of several arms, in the order of the visits.
-
-    Raises:
-        SelectionError: If a single configuration is given by its values.
-    """
-    if isinstance(members, InitialConfiguration):
-        raise SelectionError(
-            f"plan: the file is of {' and '.join(file.arms)}, so a configuration must be given by "
-            "its number in `tcs export`, which names the arm: --configuration N."
-        )
-    if isinstance(members, Choice):
-        table = 0 if members.match is None else members.match.index
-        size = Grid.from_dict(file.grid).size
-        return [table * size + members.indices[i] for i in members.order]
-    return members
-
-
-def _of_one_arm(file: ScoreFile, numbers: Sequence[int]) -> tuple[ScoreFile, list[int]]:
-    """Return the file of the arm that configurations use, and their flat indices in that.
-
-    Args:
-        file: A file of several arms.
-        numbers: Flat indices in it.
-
-    Raises:
-        SelectionError: If they use more than one arm.
-        TcsError: If there is no such configuration.
-    """
-    grid = Grid.from_dict(file.grid)
-    total = len(file.tables) * grid.size
-    for h in numbers:
-        if not 0 <= h < total:
-            raise TcsError(f"plan: no configuration {h}; the file has {total:,}, from 0.")
-    tables, rows = np.divmod(np.array(numbers, dtype=np.int64), grid.size)
-    arms, of_arm = np.divmod(rows, grid.arm_size)
-    if len(set(arms.tolist())) > 1:
-        used = ", ".join(
-            f"{h} ({grid.arms[arm]})" for h, arm in zip(numbers, arms.tolist(), strict=True)
-        )
-        raise SelectionError(
-            f"plan: the stops use more than one arm, configurations {used}, and a plan is of one. "
-            "Plan those of each arm: --configuration N."
-        )
-    arm = file_of_arm(file, grid.arms[int(arms[0])])
-    return arm, (tables * grid.arm_size + of_arm).tolist()
-
-
 Place = tuple[int | None, list[float]]
 """Flat index of a configuration, None off the grid, and the value of each axis [m or rad]."""
 
 
+Server = tuple[int, int]
+"""Number of a stop, and of a hand there."""
+
+
 def _places(
     file: ScoreFile, job: Job, members: Choice | Sequence[int] | InitialConfiguration
-) -> tuple[list[Place], list[list[int]]]:
-    """Return the stops, and for each goal the numbers of those to try it from, the best first."""
+) -> tuple[list[Place], list[list[Server]]]:
+    """Return the stops, and for each goal from which to try it with which hand, the best first."""
     axes = job.scored_grid.axes
     if isinstance(members, InitialConfiguration):
         values = [value_of(members, axis.name) for axis in axes]
-        return [(None, values)], [[0]] * len(job.task.goals)
+        every: list[list[Server]] = [[] for _ in file.nominal.sets.weights]
+        for hand, goals in enumerate(file.goals_of_hands):
+            for goal in goals:
+                every[goal].append((0, hand))
+        return [(None, values)], every
     if isinstance(members, Choice):
         table = 0 if members.match is None else members.match.index
         members = [table * job.grid.size + members.indices[i] for i in members.order]
@@ -229,34 +214,17 @@ def _places(
     return places, _serving(file, job, members)
 
 
-def _file_of_refined(file: ScoreFile, chosen: RefinedSet) -> ScoreFile:
-    """Return the file of the arm that a refined set uses: the file itself if it is of one arm.
+def _refined_places(
+    file: ScoreFile, job: Job, chosen: RefinedSet
+) -> tuple[list[Place], list[list[Server]]]:
+    """Return the stops of a refined set of a file, as `_places` does.
 
     Raises:
         TcsError: If the file has no such set.
-        SelectionError: If its members use more than one arm.
     """
     refined = file.tables[chosen.table].refined
     if refined is None or not 0 <= chosen.row < len(refined.origin):
         raise TcsError(f"plan: no refined set {chosen.row}. Refine the file: tcs refine FILE.")
-    if not file.arms:
-        return file
-    grid = file.configurations
-    used = {int(refined.origin[chosen.row, i]) // grid.arm_size for i in chosen.order}
-    if len(used) > 1:
-        raise SelectionError(
-            "plan: the refined set uses more than one arm, and a plan is of one. Plan "
-            "configurations of each arm: --configuration N."
-        )
-    return file_of_arm(file, grid.arms[used.pop()])
-
-
-def _refined_places(
-    file: ScoreFile, job: Job, chosen: RefinedSet
-) -> tuple[list[Place], list[list[int]]]:
-    """Return the stops of a refined set of a file, as `_places` does."""
-    refined = file.tables[chosen.table].refined
-    assert refined is not None
     observed = file.observed_states[chosen.table]
     names = [axis.name for axis in file.configurations.axes]
     places: list[Place] = []
@@ -268,7 +236,10 @@ def _refined_places(
         places.append((None, [float(known[axis.name]) for axis in job.scored_grid.axes]))
     rows = list(chosen.order)
     reached, dexterity = refined.reached[chosen.row, rows], refined.dexterity[chosen.row, rows]
-    return places, _by_dexterity(reached, dexterity)
+    hand = np.zeros(reached.shape, np.uint8)
+    if refined.hand is not None:
+        hand = refined.hand[chosen.row, rows]
+    return places, _by_dexterity(reached, dexterity, hand)
 
 
 def exact_state(
@@ -303,20 +274,30 @@ def value_of(at: InitialConfiguration, axis: str) -> float:
     return float(values[axis])
 
 
-def _serving(file: ScoreFile, job: Job, members: Sequence[int]) -> list[list[int]]:
-    """Return the numbers of the members that reach each goal, the most dexterous first."""
-    reached, dexterity = [], []
+def _serving(file: ScoreFile, job: Job, members: Sequence[int]) -> list[list[Server]]:
+    """Return the members that reach each goal with their hands, the most dexterous first."""
+    reached, dexterity, hand = [], [], []
     for h in members:
         table, row = divmod(h, job.grid.size)
         scores = file.tables[table].scores
         reached.append(scores.reached[row])
         dexterity.append(scores.dexterity[row])
-    return _by_dexterity(np.array(reached), np.array(dexterity))
+        hand.append(np.zeros(scores.goals, np.uint8) if scores.hand is None else scores.hand[row])
+    return _by_dexterity(np.array(reached), np.array(dexterity), np.array(hand))
 
 
-def _by_dexterity(reached: NDArray[np.bool_], dexterity: NDArray[np.float32]) -> list[list[int]]:
-    """Return the members that reach each goal, the most dexterous first, given shapes (m, G)."""
+def _by_dexterity(
+    reached: NDArray[np.bool_], dexterity: NDArray[np.float32], hand: NDArray[np.uint8]
+) -> list[list[Server]]:
+    """Return the members that reach each goal with their hands, the most dexterous first.
+
+    Args:
+        reached: Whether a member reaches a goal, shape (m, G).
+        dexterity: Its dexterity there, shape (m, G).
+        hand: Number of its hand there, shape (m, G).
+    """
     order = np.argsort(-dexterity, axis=0, kind="stable")
     return [
-        [int(n) for n in order[:, goal] if reached[n, goal]] for goal in range(reached.shape[1])
+        [(int(n), int(hand[n, goal])) for n in order[:, goal] if reached[n, goal]]
+        for goal in range(reached.shape[1])
     ]

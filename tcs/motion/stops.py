@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from tcs.errors import TaskError
 from tcs.kernel.analytic.solver import is_outside
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.motion.edges import posture_contact
@@ -98,7 +99,13 @@ class StopGrid:
 
         Raises:
             RobotError: If a velocity limit is unknown.
+            TaskError: If goals are reached by two arms at the same time.
         """
+        if job.other_joints:
+            raise TaskError(
+                f"task '{job.task.name}' has goals that two arms reach at the same time, but one "
+                "arm moves at a time. Leave 'together_with' out of the task to plan."
+            )
         rates = np.array(job.spec.robot.arm_rates())
         # Those of joints that never move decide nothing.
         velocity, acceleration = in_chain(rates, 1.0)

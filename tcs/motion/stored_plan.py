@@ -33,7 +33,7 @@ _FAULTS = (
 """What reading something else than a plan raises."""
 SEGMENT_TYPES = ("move", "approach", "retreat")
 _BASE = ("base_x", "base_y", "base_yaw_deg", "torso")
-_STOP = (*_BASE, "configuration", "goals", "returns", "duration", "segments")
+_STOP = (*_BASE, "hand", "joints", "configuration", "goals", "returns", "duration", "segments")
 
 
 def load_plan(path: str | os.PathLike[str]) -> MotionPlan:
@@ -108,6 +108,8 @@ def _stop(plain: Mapping[str, Any], joints: int) -> StopPlan:
         index=None if plain["configuration"] is None else _integer(plain["configuration"]),
         segments=tuple(_segment(segment, joints) for segment in plain["segments"]),
         returns=bool(plain["returns"]),
+        hand=str(plain.get("hand", "")),
+        joints=tuple(str(name) for name in plain.get("joints", ())),
     )
 
 

@@ -83,8 +83,8 @@ class Answers:
         """
         if request.configuration is not None and request.here is not None:
             raise ServiceError("give 'configuration' or 'here', not both.")
-        if request.here is None and (request.at or request.torso or request.arm):
-            raise ServiceError("'torso', 'at' and 'arm' require 'here'.")
+        if request.here is None and (request.at or request.torso):
+            raise ServiceError("'torso' and 'at' require 'here'.")
         with self._files.held(request.file).lock:
             file = self._files.loaded(request.file)
             explanation = explain(
@@ -92,7 +92,7 @@ class Answers:
                 goal_index(file, request.goal),
                 request.configuration
                 if request.here is None
-                else state_of(request.here, request.torso, request.at, request.arm),
+                else state_of(request.here, request.torso, request.at),
                 weights=fix_weights(
                     file.configurations,
                     metre=request.metre_weight,
@@ -104,6 +104,11 @@ class Answers:
                 observed=observed_of(request.observed, file.observed_axes),
                 frames=request.frames,
             )
+            if request.arm is not None:
+                # Imported here: other explanations need neither simulator nor compiler.
+                from tcs.placement.refinement.by_arm import explained_by_arm
+
+                explanation = explained_by_arm(explanation, request.arm)
             result = explanation_in_words(file, explanation)
         return dict(without_infinities(result))
 

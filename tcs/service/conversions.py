@@ -85,16 +85,13 @@ def table_of(file: ScoreFile, request: Observed) -> int:
     return nearest_table(file, None, observed, request.frames).index
 
 
-def state_of(
-    here: BasePose, torso: float, at: Mapping[str, float], arm: str | None = None
-) -> InitialConfiguration:
+def state_of(here: BasePose, torso: float, at: Mapping[str, float]) -> InitialConfiguration:
     """Return the state of robot and environment.
 
     Args:
         here: x [m], y [m] and heading [deg] in the environment frame.
         torso: Torso height [m].
         at: Settings of the environment in m, or in degrees under names that end in `_deg`.
-        arm: Name of the arm, where configurations use one of several.
 
     Raises:
         SelectionError: If an axis is set twice.
@@ -107,7 +104,6 @@ def state_of(
         torso=torso,
         environment=tuple(settings_of(at, "at").items()),
         environment_units=tuple("rad" if name.endswith("_deg") else "m" for name in at),
-        arm=arm,
     )
 
 

@@ -148,9 +148,8 @@ def outcome_of(
     index, _ = nearest_configuration(grid, stated)
     if best:
         index = _best_at(grid, scores, index)
-    rows = np.arange(index, grid.size, grid.arm_size) if grid.arms else np.array([index])
-    goals = [_goal(file, scores, rows, goal) for goal in range(scores.goals)]
-    reached, dexterity = scores.reached[rows].any(axis=0), scores.dexterity[rows].max(axis=0)
+    goals = [_goal(file, scores, index, goal) for goal in range(scores.goals)]
+    reached, dexterity = scores.reached[index], scores.dexterity[index]
     state = int(grid.state_of(np.array([index]))[0])
     member, refined = grid.configuration(index), None if best else _refined_at(file, table, stated)
     if refined is not None:
@@ -226,19 +225,13 @@ def _best_at(grid: Grid, scores: ScoreTable, index: int) -> int:
             along[i] = value
         candidates.append(int(grid.flat(along)))
     found = np.array(candidates)
-    if grid.arms:
-        rows = found[:, None] + grid.arm_size * np.arange(len(grid.arms))
-    else:
-        rows = found[:, None]
-    reached = np.asarray(scores.reached[rows].any(axis=1))
-    dexterity = np.asarray(scores.dexterity[rows].max(axis=1))
-    worth = tc_reachability(reached, scores.weights) + tc_manipulability(dexterity, scores.weights)
+    worth = tc_reachability(scores.reached[found], scores.weights)
+    worth = worth + tc_manipulability(scores.dexterity[found], scores.weights)
     return int(found[np.argmax(worth)]) if worth.max() > 0.0 else index
 
 
-def _goal(file: ScoreFile, scores: ScoreTable, rows: Any, goal: int) -> dict[str, Any]:
-    """Return the outcome at a goal, by the first arm that reaches it."""
-    row = rows[int(np.argmax(scores.reached[rows, goal]))]
+def _goal(file: ScoreFile, scores: ScoreTable, row: int, goal: int) -> dict[str, Any]:
+    """Return the outcome at a goal, by the best hand."""
     reason = Reason(scores.reason[row, goal])
     number = int(scores.pair[row, goal])
     pair = scores.pair_names[number] if number >= 0 else None
@@ -255,6 +248,7 @@ def _goal(file: ScoreFile, scores: ScoreTable, rows: Any, goal: int) -> dict[str
         "words": f"{REASON_TEXTS[reason]}{contact}",
         "pair": None if pair is None else list(pair),
         "dexterity": float(scores.dexterity[row, goal]),
+        **({} if scores.hand is None else {"hand": file.hand_names[scores.hand[row, goal]]}),
     }
 
 

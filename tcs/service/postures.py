@@ -13,7 +13,7 @@ import numpy as np
 from tcs.errors import SelectionError
 from tcs.model.grid import InitialConfiguration
 from tcs.placement.reasons import nearest_configuration
-from tcs.placement.store import ScoreFile, file_of_arm
+from tcs.placement.store import ScoreFile
 from tcs.placement.tables import Reason
 
 if TYPE_CHECKING:
@@ -47,7 +47,8 @@ class ScenePostures:
     def __init__(self) -> None:
         """Keep no scene yet."""
         self._lock = threading.Lock()
-        self._scenes: OrderedDict[str, _ShownScene] = OrderedDict()
+        self._scenes: OrderedDict[str, tuple[_ShownScene, ...]] = OrderedDict()
+        """Of each file the scene of each hand."""
 
     def at(
         self,
@@ -62,7 +63,7 @@ class ScenePostures:
 
         Args:
             digest: Digest of the score file, under which its scene is kept.
-            file: The score file; of one with several arms, the first arm is shown.
+            file: The score file; of one with several hands, the one that serves the goal is shown.
             stated: The configuration; the nearest one of the grid is shown.
             goal: The goal that the arm is at; by default the one of greatest dexterity. The arm is
                 at rest where it does not reach it.
@@ -79,7 +80,6 @@ class ScenePostures:
                 `stated` is beyond the grid.
             StoreMismatchError: If the models are not those the file was made from.
         """
-        file = file_of_arm(file, file.arms[0]) if file.arms else file
         grid, scores = file.configurations, file.nominal.scores
         index, _ = nearest_configuration(grid, stated)
         if goal is not None and not 0 <= goal < scores.goals:
@@ -100,7 +100,9 @@ class ScenePostures:
     ) -> dict[str, Any]:
         from tcs.model.scene import goal_poses
 
-        shown = self._scene(digest, file)
+        scores = file.nominal.scores
+        hand = 0 if goal is None or scores.hand is None else int(scores.hand[index, goal])
+        shown = self._scene(digest, file)[hand]
         scene = shown.scene
         member = file.configurations.configuration(index)
         for name, value in member.environment:
@@ -133,15 +135,17 @@ class ScenePostures:
             "goal": goal,
         }
 
-    def _scene(self, digest: str, file: ScoreFile) -> _ShownScene:
-        """Return the scene of a file, built when it is first looked at."""
-        from tcs.output.report.score.scored_scenes import scored_scene
+    def _scene(self, digest: str, file: ScoreFile) -> tuple[_ShownScene, ...]:
+        """Return the scene of each hand of a file, built when it is first looked at."""
+        from tcs.output.report.score.scored_scenes import scored_scenes
         from tcs.output.report.score.shown_set import ShownSet
 
         if digest not in self._scenes:
             shown = ShownSet(None, (), (), file.nominal_index, "", file)
-            job, scene = scored_scene(file, shown)
-            self._scenes[digest] = _ShownScene(job.task, scene, *_shapes_of(scene))
+            self._scenes[digest] = tuple(
+                _ShownScene(job.task, scene, *_shapes_of(scene))
+                for job, scene in scored_scenes(file, shown)
+            )
         self._scenes.move_to_end(digest)
         while len(self._scenes) > _KEPT:
             self._scenes.popitem(last=False)

@@ -15,9 +15,9 @@ from tcs.model.scene.changes import EnvironmentChanges, Shift, changed_environme
 from tcs.model.scene.pieces import PlacedPiece
 from tcs.placement.constraints import Constraints, recorded_constraints
 from tcs.placement.scoring.job import Job
-from tcs.placement.scoring.offline import ScoringSetup
-from tcs.placement.scoring.rebuild import recorded_job
-from tcs.placement.store import APPROACH, ScoreFile
+from tcs.placement.scoring.offline import load_setups, score_setups
+from tcs.placement.scoring.rebuild import recorded_jobs
+from tcs.placement.store import APPROACH, ARMS, ScoreFile
 from tcs.service.conversions import regions_of, settings_of
 from tcs.service.jobs import Progress
 from tcs.service.requests import RescoreRequest
@@ -40,8 +40,8 @@ class Rescorer:
         """
         self._sent, self._threads = sent, threads
         self._job: tuple[Mapping[str, Any], Job] | None = None
-        self._scene: Scene | None = None
-        self._contacts: tuple[tuple[str, str], ...] = ()
+        self._scenes: list[tuple[tuple[tuple[str, str], ...], Scene]] = []
+        """Scenes of the last environment, with the contacts that each allows."""
 
     def rescored(self, file: ScoreFile, request: RescoreRequest, progress: Progress) -> ScoreFile:
         """Return the scores of a file's task in a changed environment.
@@ -52,15 +52,9 @@ class Rescorer:
             progress: Reports the configurations done and in all.
 
         Raises:
-            SelectionError: If the file is of several arms.
             UnknownNameError: If nothing has the name of something that is moved.
             TcsError: As `tcs.score`.
         """
-        if file.arms:
-            raise SelectionError(
-                f"a changed environment is scored for one arm, but the file is of "
-                f"{' and '.join(file.arms)}. Score the task with the robot of one arm."
-            )
         begun = time.perf_counter()
         grid = grid_of_state(file.configurations, request)
         grid = thinned(grid, request.every, request.around)
@@ -71,36 +65,50 @@ class Rescorer:
         )
         recorded = recorded_constraints(file.metadata)
         forbid = (*recorded.forbid, *regions_of(request.forbid))
-        setup = ScoringSetup.load(
+        setups = load_setups(
             file.metadata["task"], self._sent.made(changed), file.metadata["robot"],
             measure=file.metadata["measure"], jobs=self._threads,
             sets={"max_members": request.max_members}, constraints=Constraints(forbid=forbid),
             approach=APPROACH in file.metadata, build=self._scene_of,
+            arms=file.metadata.get(ARMS),
         )  # fmt: skip
-        return setup.score(begun=begun, on_progress=progress, on_compile=progress.compiling)
+        return score_setups(
+            setups, begun=begun, on_progress=progress, on_compile=progress.compiling
+        )
 
     def _job_of(self, file: ScoreFile) -> Job:
-        """Return the job of a file, the same as the last time for the same file."""
+        """Return the job of a file's first hand, the same as the last time for the same file."""
         if self._job is None or self._job[0] is not file.metadata:
-            self._job = (file.metadata, recorded_job(file.metadata))
+            self._job = (file.metadata, recorded_jobs(file.metadata)[0])
         return self._job[1]
 
     def _scene_of(self, job: Job) -> Scene:
-        """Return the scene of a job: the last one where only the grid is another."""
-        kept, contacts = self._scene, tuple(job.task.allowed_contacts)
-        if kept is None or self._contacts != contacts or not _is_same_scene(kept.spec, job.spec):
-            self._scene = None
-            self._scene, self._contacts = job.scene(), contacts
-        assert self._scene is not None
-        return self._scene
+        """Return the scene of a job: one of the last where only the grid is another."""
+        contacts = tuple(job.task.allowed_contacts)
+        for allowed, kept in self._scenes:
+            if allowed == contacts and _is_same_scene(kept.spec, job.spec):
+                return kept
+        # Those of other environments are of no use any more.
+        self._scenes = [
+            (allowed, kept)
+            for allowed, kept in self._scenes
+            if _is_same_environment(kept.spec, job.spec)
+        ]
+        self._scenes.append((contacts, job.scene()))
+        return self._scenes[-1][1]
 
 
 def _is_same_scene(first: SceneSpec, second: SceneSpec) -> bool:
     """Return whether two scenes differ in nothing but the grid that is scored in them."""
+    return first.robot == second.robot and _is_same_environment(first, second)
+
+
+def _is_same_environment(first: SceneSpec, second: SceneSpec) -> bool:
+    """Return whether two environments differ in nothing but the grid that is scored in them."""
     first_environment, second_environment = (
         spec.environment.model_copy(update={"grid": {}}) for spec in (first, second)
     )
-    return first.robot == second.robot and first_environment == second_environment
+    return first_environment == second_environment
 
 
 def changes_of(request: RescoreRequest) -> EnvironmentChanges:

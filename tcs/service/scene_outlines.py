@@ -13,7 +13,7 @@ from tcs.model.scene import EnvironmentFile, Scene, goal_poses
 from tcs.model.scene.environment.environment_file import WORLD
 from tcs.model.scene.pieces import PIECES
 from tcs.output.report.score.scene_solids import base_outline, environment_parts, part_solid
-from tcs.output.report.score.scored_scenes import scene_of_base
+from tcs.output.report.score.scored_scenes import scored_scenes
 from tcs.output.report.score.shown_set import ShownSet
 from tcs.placement.store import ScoreFile
 from tcs.service.jobs import Progress
@@ -47,8 +47,7 @@ def scene_outlines(file: ScoreFile, progress: Progress, only: int | None = None)
     """
     grid = file.configurations
     shown = ShownSet(None, (), (), file.nominal_index, "", file)
-    scored = scene_of_base(file, shown)
-    job, scene = scored
+    job, scene = scored_scenes(file, shown)[0]
     base = base_outline(scene)
     states = []
     count = min(math.prod(grid.environment_shape), MOST_STATES)

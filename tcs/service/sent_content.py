@@ -72,7 +72,9 @@ def entry_of(file: ScoreFile, digest: str, size: int) -> FileEntry:
         file=digest,
         bytes=size,
         **names,
-        title=" · ".join([*(frame_name(name) for name in names.values()), *file.arms, *person]),
+        title=" · ".join(
+            [*(frame_name(name) for name in names.values()), *file.hand_names, *person]
+        ),
         goals=file.nominal.sets.weights.size,
         configurations=file.configurations.size,
         settings=[

@@ -73,8 +73,6 @@ class SceneWork:
         """
         from tcs.model.scene import Observation, load_environment
 
-        if request.arms is not None:
-            raise SelectionError("'arms' is not for an observed environment. Name the robot of it.")
         _, environment, _ = self._models(request)
         scorer = self._scorer_of(request, progress.compiling)
         progress(0, 1)
@@ -113,7 +111,10 @@ class SceneWork:
         if self._scorer is None or self._scorer[0] != key:
             self._scorer = None
             scorer = LiveScorer(
-                *self._models(request), on_compile=on_compile, **self._options(request)
+                *self._models(request),
+                arms=request.arms,
+                on_compile=on_compile,
+                **self._options(request),
             )
             self._scorer = (key, scorer)
         return self._scorer[1]

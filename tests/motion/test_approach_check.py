@@ -12,7 +12,7 @@ import tcs
 from tcs.cli.app import app
 from tcs.errors import TcsError
 from tcs.motion import approach_check, check_approaches
-from tcs.placement.scoring.rebuild import rebuild_scene
+from tcs.placement.scoring.rebuild import rebuild_scenes
 from tests.environments import CORNER, write_environment
 from tests.placement.scoring.test_hands import GOALS, write_task
 
@@ -27,7 +27,7 @@ def claimed(two_goals):
 @pytest.fixture(scope="module")
 def findings(claimed):
     """The scene of the claims, and the finding on each."""
-    scene = approach_check.ApproachScene.of(*rebuild_scene(claimed))
+    scene = approach_check.ApproachScene.of(*rebuild_scenes(claimed)[0])
     scores = claimed.nominal.scores
     return scene, [scene.check(0, g, scores.joints_of(0, g).astype(float)) for g in (0, 1)]
 

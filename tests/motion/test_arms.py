@@ -1,4 +1,4 @@
-"""Motions from the configurations of a file of both arms."""
+"""Motions from configurations at which both arms serve goals."""
 
 from __future__ import annotations
 
@@ -6,10 +6,14 @@ import numpy as np
 import pytest
 
 import tcs
-from tcs.errors import SelectionError, TcsError
-from tcs.model.grid import Grid
-from tcs.placement.store import file_of_arm
+from tcs.model.scene import ErrorDistribution
+from tcs.motion import load_plan, save_plan
+from tcs.motion.files import plan_csv
+from tcs.motion.plan_check import check_plan
+from tcs.motion.plan_success import evaluate_plan
 from tests.environments import CORNER, write_environment
+
+NONE = {"person_x": ErrorDistribution(distribution="normal", std=1e-9)}
 
 
 @pytest.fixture(scope="module")
@@ -23,47 +27,46 @@ def examined(both):
     return tcs.examine(both, within=None, jobs=1)
 
 
-def arm_numbers(both, configurations):
-    return configurations // Grid.from_dict(both.grid).arm_size
-
-
-def test_what_can_be_done_is_that_of_each_arm(both, examined):
+@pytest.fixture(scope="module")
+def planned(both, examined):
+    """The plan of a stop at which both arms do goals."""
     (table,) = examined.tables
-    number = both.arms.index("right")
-    right = arm_numbers(both, table.configurations) == number
-    (alone,) = tcs.examine(file_of_arm(both, "right"), within=None, jobs=1).tables
-    first = number * Grid.from_dict(both.grid).arm_size
-    np.testing.assert_array_equal(table.configurations[right] - first, alone.configurations)
-    np.testing.assert_array_equal(table.outcome[right], alone.outcome)
-    # Each arm can do something, or the numbers of the other would do.
-    assert table.done[right].any()
-    assert table.done[~right].any()
+    served = both.nominal.sets.served[
+        np.searchsorted(both.nominal.sets.candidates, table.configurations)
+    ]
+    by_left, by_right = ((table.done & (served == hand)).sum(axis=1) for hand in (1, 2))
+    row = int(np.argmax(np.minimum(by_left, by_right) * 100 + table.done.sum(axis=1)))
+    assert min(by_left[row], by_right[row]) > 0
+    return tcs.plan(both, [int(table.configurations[row])]), table.done[row]
+
+
+def test_what_can_be_done_is_done_by_each_arm_in_turn(planned):
+    plan, done = planned
+    assert [stop.hand for stop in plan.stops] == ["left", "right"]
+    assert [stop.joints[0][:2] for stop in plan.stops] == ["l_", "r_"]
+    assert {result.goal for result in plan.results if result.done} == set(np.flatnonzero(done))
+    assert plan.false == 0
+    for result in plan.results:
+        if result.done:
+            assert result.goal in plan.stops[result.stop].goals
+
+
+def test_a_plan_of_both_arms_is_checked_and_evaluated(planned, tmp_path):
+    plan, _ = planned
+    save_plan(tmp_path / "plan.json", plan)
+    again = load_plan(tmp_path / "plan.json")
+    assert [stop.joints for stop in again.stops] == [stop.joints for stop in plan.stops]
+    found = check_plan(again)
+    assert found.is_sound
+    assert found.goals == plan.goals_done
+    rooms = evaluate_plan(again, samples=1, errors=NONE, replan=True)
+    assert rooms.blind.all()
+    header = plan_csv(again).splitlines()[0].split(",")
+    assert set(plan.stops[0].joints) | set(plan.stops[1].joints) <= set(header)
 
 
 def test_sets_of_both_arms_are_chosen_by_what_can_be_done(both, examined):
-    here = Grid.from_dict(both.grid).configuration(0)
-    chosen = tcs.select(both, here, motions=examined)
+    chosen = tcs.select(both, both.configurations.configuration(0), motions=examined)
     (table,) = examined.tables
     rows = np.searchsorted(table.configurations, chosen.indices)
     assert chosen.reachability == pytest.approx(table.done[rows].any(axis=0).mean())
-
-
-def test_a_plan_is_of_the_arm_of_its_stops(both, examined):
-    (table,) = examined.tables
-    right = arm_numbers(both, table.configurations) == both.arms.index("right")
-    row = int(np.argmax(table.done.sum(axis=1) * right))
-    number = int(table.configurations[row])
-    plan = tcs.plan(both, [number])
-    assert plan.stops[0].index == number
-    assert all(joint.startswith("r_") for joint in plan.joints)
-    done = [result.goal for result in plan.results if result.done]
-    assert set(np.flatnonzero(table.done[row])) <= set(done)
-    assert plan.false == 0
-    left = int(table.configurations[~right][0])
-    with pytest.raises(SelectionError, match=rf"{left} \(left\), {number} \(right\)"):
-        tcs.plan(both, [left, number])
-    with pytest.raises(TcsError, match="no configuration"):
-        tcs.plan(both, [2 * number + 1000])
-    here = Grid.from_dict(both.grid).configuration(0)
-    with pytest.raises(SelectionError, match="--configuration"):
-        tcs.plan(both, here)

@@ -14,12 +14,12 @@ from tcs.model.tasks import KeepOut, load_task
 from tcs.motion import Stop
 from tcs.motion.keep_out import scene_with_keep_out
 from tcs.motion.recheck import StopCheck
-from tcs.placement.scoring.rebuild import rebuild_scene
+from tcs.placement.scoring.rebuild import rebuild_scenes
 
 
 @pytest.fixture(scope="module")
 def stop(two_goals):
-    job, scene, _ = rebuild_scene(tcs.load(two_goals))
+    job, scene, _ = rebuild_scenes(tcs.load(two_goals))[0]
     return Stop.of(job, scene, 0, seed=0)
 
 

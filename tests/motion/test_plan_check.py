@@ -18,7 +18,7 @@ from tcs.motion import Stop, Timed, check_plan, load_plan, save_plan
 from tcs.motion.plan_check import LIMIT_BAR, _jumps
 from tcs.motion.recheck import _is_within_limits
 from tcs.output.terminal.motion_tables import report_plan_check
-from tcs.placement.scoring.rebuild import rebuild_scene
+from tcs.placement.scoring.rebuild import rebuild_scenes
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +31,7 @@ def written(planned, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def stop(two_goals):
-    job, scene, _ = rebuild_scene(tcs.load(two_goals))
+    job, scene, _ = rebuild_scenes(tcs.load(two_goals))[0]
     return Stop.of(job, scene, 0, seed=0)
 
 

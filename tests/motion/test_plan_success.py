@@ -13,9 +13,9 @@ from tcs.cli.app import app
 from tcs.errors import TcsError
 from tcs.model.scene import ErrorDistribution
 from tcs.motion import evaluate_plan, save_plan
+from tcs.motion.plan_check import hands_of
 from tcs.motion.plan_success import _Place
 from tcs.output.terminal.robustness_tables import report_plan_success
-from tcs.placement.scoring.rebuild import rebuild_made_from
 
 
 def off(joint, std):
@@ -45,8 +45,8 @@ def test_a_goal_that_is_lost_at_its_stop_is_tried_from_the_others(planned):
 
 
 def test_the_base_may_touch_the_furniture_alone(planned):
-    job, scene = rebuild_made_from(planned.made_from)
-    place = _Place.of(planned.stops[0], job, scene)
+    hand = hands_of(planned)[""]
+    scene, place = hand.scene, _Place.of(planned.stops[0], hand)
     met = set()
     # The wheelchair comes nearer to the robot, until its wheel meets the base.
     for y in np.arange(0.0, 0.75, 0.15):

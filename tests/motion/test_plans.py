@@ -20,12 +20,12 @@ from tcs.motion import Stop, recheck, save_plan
 from tcs.motion.recheck import false_pieces
 from tcs.motion.stop_tour import _Tour
 from tcs.output.terminal.motion_tables import report_plan
-from tcs.placement.scoring.rebuild import rebuild_scene
+from tcs.placement.scoring.rebuild import rebuild_scenes
 
 
 @pytest.fixture(scope="module")
 def stop(two_goals):
-    job, scene, _ = rebuild_scene(tcs.load(two_goals))
+    job, scene, _ = rebuild_scenes(tcs.load(two_goals))[0]
     return Stop.of(job, scene, 0, seed=0)
 
 

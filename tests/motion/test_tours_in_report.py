@@ -14,7 +14,7 @@ from tcs.output.report.blocks import Bullets, Table, Text
 from tcs.output.report.score import report as score_report
 from tcs.output.report.score import tours
 from tcs.output.report.score.tours import Tours, tours_blocks
-from tcs.placement.scoring.rebuild import rebuild_scene
+from tcs.placement.scoring.rebuild import rebuild_scenes
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -28,7 +28,7 @@ def _fewer_postures():
 
 @pytest.fixture(scope="module")
 def measured(planned, two_goals, _fewer_postures):
-    _, scene, _ = rebuild_scene(tcs.load(two_goals))
+    _, scene, _ = rebuild_scenes(tcs.load(two_goals))[0]
     return Tours.of(planned, scene)
 
 

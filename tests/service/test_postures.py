@@ -8,7 +8,7 @@ import pytest
 import tcs
 from tcs.errors import SelectionError
 from tcs.model.scene import goal_poses
-from tcs.placement.scoring import rebuild_scene
+from tcs.placement.scoring import rebuild_scenes
 from tcs.service import Engine, PostureRequest
 from tests.environments import CORNER, write_environment
 
@@ -45,7 +45,7 @@ def test_bodies_are_where_drake_has_them_and_the_arm_is_at_the_goal(held):
     goal = int(np.flatnonzero(scores.reached[index])[-1])
     found = engine.posture(PostureRequest(file=digest, goal=goal, **here_of(file, index)))
     assert (found["configuration"], found["goal"]) == (index, goal)
-    job, scene, _ = rebuild_scene(file)
+    job, scene, _ = rebuild_scenes(file)[0]
     member = file.configurations.configuration(index)
     scene.place_base(member.base_x, member.base_y, member.base_yaw)
     scene.set_torso(member.torso)

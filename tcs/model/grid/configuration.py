@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 from tcs.errors import TcsError
 
@@ -31,8 +30,6 @@ class InitialConfiguration:
     """Name and value of each environment axis, e.g. ("bed_height", 0.2) [m, rad]."""
     environment_units: tuple[str, ...] = ()
     """Unit of each environment axis, "m" or "rad", in the order of `environment`."""
-    arm: str | None = None
-    """Name of the arm that does the task, where configurations may use one of several."""
 
     def __post_init__(self) -> None:
         """Check that every environment axis has a unit.
@@ -62,15 +59,12 @@ class InitialConfiguration:
         if self.environment:
             rounded = tuple((name, round(float(value), 12)) for name, value in self.environment)
             values += [f"environment={rounded}", f"environment_units={self.environment_units}"]
-        if self.arm is not None:
-            values.append(f"arm={self.arm!r}")
         return f"{type(self).__name__}({', '.join(values)})"
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, float]:
         """Return the configuration as plain numbers, angles in degrees under `..._deg` names.
 
-        Values are rounded to nine decimals, so that 29 steps of 0.05 m print as 1.45. The name of
-        the arm comes last, under `arm`, if there is one.
+        Values are rounded to nine decimals, so that 29 steps of 0.05 m print as 1.45.
 
         >>> InitialConfiguration(
         ...     base_x=1.0, base_y=-0.5, base_yaw=0.0, torso=0.3,
@@ -89,5 +83,4 @@ class InitialConfiguration:
                 plain[f"{name}_deg"] = math.degrees(value)
             else:
                 plain[name] = float(value)
-        rounded: dict[str, Any] = {name: round(value, 9) for name, value in plain.items()}
-        return rounded if self.arm is None else {**rounded, "arm": self.arm}
+        return {name: round(value, 9) for name, value in plain.items()}

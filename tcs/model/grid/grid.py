@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -30,8 +29,7 @@ class Grid:
     """Every combination of the values of its axes.
 
     A configuration is identified by its flat index in C order over the axes: the last axis, the
-    torso, changes fastest. Axes of the environment come first, then `ROBOT_AXES`. If each
-    configuration uses one of several arms, those of the first arm come before those of the second.
+    torso, changes fastest. Axes of the environment come first, then `ROBOT_AXES`.
 
     >>> grid = Grid.from_spec({
     ...     "base_x": {"unit": "m", "start": -1.5, "step": 0.05, "count": 61},
@@ -46,22 +44,14 @@ class Grid:
     """
 
     axes: tuple[Axis, ...]
-    arms: tuple[str, ...] = ()
-    """Names of the arms that configurations use, one each; () if there is only one arm."""
 
     def __post_init__(self) -> None:
-        """Check the axes and the arms.
+        """Check the axes.
 
         Raises:
-            GridError: If a robot axis is missing, out of place or in a wrong unit, an axis, a
-                heading or an arm is repeated, there is one arm only, or there are more than
-                `MAX_CONFIGURATIONS`.
+            GridError: If a robot axis is missing, out of place or in a wrong unit, an axis or a
+                heading is repeated, or there are more than `MAX_CONFIGURATIONS`.
         """
-        if len(set(self.arms)) < len(self.arms) or len(self.arms) == 1 or "" in self.arms:
-            raise GridError(
-                f"grid: arms are {', '.join(self.arms)}, but must be two or more different names, "
-                "or none."
-            )
         names = [axis.name for axis in self.axes]
         for name in names:
             if names.count(name) > 1:
@@ -97,9 +87,8 @@ class Grid:
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
-        """Number of arms, if there are several, and number of values of each axis."""
-        counts = tuple(axis.count for axis in self.axes)
-        return (len(self.arms), *counts) if self.arms else counts
+        """Number of values of each axis."""
+        return tuple(axis.count for axis in self.axes)
 
     @cached_property
     def size(self) -> int:
@@ -107,27 +96,9 @@ class Grid:
         return math.prod(self.shape)
 
     @cached_property
-    def arm_size(self) -> int:
-        """Number of configurations of each arm."""
-        return math.prod(axis.count for axis in self.axes)
-
-    @cached_property
     def state_size(self) -> int:
-        """Number of configurations of each arm in each state of the environment."""
+        """Number of configurations in each state of the environment."""
         return math.prod(axis.count for axis in self.axes[-len(ROBOT_AXES) :])
-
-    @property
-    def of_one_arm(self) -> Self:
-        """The grid of each arm by itself."""
-        return dataclasses.replace(self, arms=())
-
-    def arm_of(self, flat_index: int) -> str | None:
-        """Return the name of the arm that a configuration uses, None if there is only one.
-
-        Raises:
-            GridError: If the index is not one of this grid.
-        """
-        return self.arms[int(self._checked(flat_index)) // self.arm_size] if self.arms else None
 
     def state_of(self, flat: ArrayLike) -> NDArray[np.int64]:
         """Return the number of the environment's state of configurations, in C order over its axes.
@@ -138,7 +109,7 @@ class Grid:
         Raises:
             GridError: If an index is not one of this grid.
         """
-        return np.asarray(self._checked(flat) % self.arm_size // self.state_size)
+        return np.asarray(self._checked(flat) // self.state_size)
 
     @cached_property
     def environment_axes(self) -> tuple[Axis, ...]:
@@ -179,23 +150,20 @@ class Grid:
         Raises:
             GridError: If an index is not one of this grid.
         """
-        checked = self._checked(flat) % self.arm_size
-        shape = tuple(axis.count for axis in self.axes)
-        return np.stack(np.unravel_index(checked, shape), axis=-1).astype(np.int64)
+        checked = self._checked(flat)
+        return np.stack(np.unravel_index(checked, self.shape), axis=-1).astype(np.int64)
 
-    def flat(self, indices: ArrayLike, arm: str | None = None) -> NDArray[np.int64]:
+    def flat(self, indices: ArrayLike) -> NDArray[np.int64]:
         """Return flat indices, the inverse of `indices`.
 
         Args:
             indices: Index along each axis in the order of `axes`, shape (..., n_axes).
-            arm: The arm of all of them; by default the first one.
 
         Returns:
             Flat indices, shape (...).
 
         Raises:
             GridError: If the indices do not fit the axes of this grid.
-            UnknownNameError: If the grid has no such arm.
         """
         along = np.asarray(indices)
         if along.ndim == 0 or along.shape[-1] != len(self.axes) or along.dtype.kind not in "iu":
@@ -203,24 +171,9 @@ class Grid:
                 f"grid: needs {len(self.axes)} whole-number indices for each configuration, "
                 f"but got shape {along.shape} of {along.dtype}."
             )
-        shape = tuple(axis.count for axis in self.axes)
-        if np.any(along < 0) or np.any(along >= shape):
-            raise GridError(f"grid: an index lies outside the shape {shape}.")
-        of_first = np.asarray(np.ravel_multi_index(tuple(np.moveaxis(along, -1, 0)), shape))
-        return of_first if arm is None else of_first + self.arm_number(arm) * self.arm_size
-
-    def arm_number(self, arm: str) -> int:
-        """Return the number of an arm.
-
-        Raises:
-            UnknownNameError: If the grid has no such arm.
-            GridError: If it has one arm only.
-        """
-        if arm not in self.arms:
-            if not self.arms:
-                raise GridError(f"grid: has one arm only, so there is no arm '{arm}' to choose.")
-            raise UnknownNameError("arm", arm, self.arms, where="grid")
-        return self.arms.index(arm)
+        if np.any(along < 0) or np.any(along >= self.shape):
+            raise GridError(f"grid: an index lies outside the shape {self.shape}.")
+        return np.asarray(np.ravel_multi_index(tuple(np.moveaxis(along, -1, 0)), self.shape))
 
     def values(self, flat: ArrayLike) -> dict[str, NDArray[np.float64]]:
         """Return the coordinates of configurations.
@@ -244,21 +197,20 @@ class Grid:
             GridError: If the index is not one of this grid.
         """
         # Plain numbers: arrays of one element take five times as long.
-        rest, values = int(self._checked(flat_index)) % self.arm_size, []
+        rest, values = int(self._checked(flat_index)), []
         for axis in reversed(self.axes):
             rest, along = divmod(rest, axis.count)
             values.append(axis.value(along))
-        return self.between(values[::-1], flat_index)
+        return self.between(values[::-1])
 
-    def between(self, values: Sequence[float], near: int) -> InitialConfiguration:
+    def between(self, values: Sequence[float]) -> InitialConfiguration:
         """Return a configuration that need not be on the grid.
 
         Args:
             values: Values in the order of the axes [m or rad].
-            near: Flat index of a configuration with the same arm.
 
         Raises:
-            GridError: If the index is not one of this grid, or a value is missing.
+            GridError: If a value is missing.
         """
         if len(values) != len(self.axes):
             raise GridError(f"grid: {len(values)} values for {len(self.axes)} axes.")
@@ -270,7 +222,6 @@ class Grid:
             torso=at["torso"],
             environment=tuple((axis.name, at[axis.name]) for axis in self.environment_axes),
             environment_units=tuple(axis.held_unit for axis in self.environment_axes),
-            arm=self.arm_of(near),
         )
 
     def overridden(self, changes: Mapping[str, Mapping[str, object]], *, where: str = "") -> Self:
@@ -298,8 +249,7 @@ class Grid:
 
     def to_dict(self) -> dict[str, object]:
         """Return the grid as plain containers, for a file."""
-        arms = {"arms": list(self.arms)} if self.arms else {}
-        return {"axes": [axis.to_dict() for axis in self.axes], **arms}
+        return {"axes": [axis.to_dict() for axis in self.axes]}
 
     @classmethod
     def from_dict(cls, plain: Mapping[str, object], *, where: str = "") -> Self:
@@ -312,11 +262,7 @@ class Grid:
         axes = plain.get("axes")
         if not isinstance(axes, list | tuple) or not all(isinstance(a, Mapping) for a in axes):
             raise GridError(f"{where or 'grid'}: needs 'axes', a list of axes.")
-        arms = plain.get("arms", [])
-        if not isinstance(arms, list | tuple) or not all(isinstance(arm, str) for arm in arms):
-            raise GridError(f"{where or 'grid'}: 'arms' must be a list of names.")
-        of_axes = tuple(Axis.from_dict(axis, where=where) for axis in axes)
-        return cls._located(of_axes, where, tuple(arms))
+        return cls._located(tuple(Axis.from_dict(axis, where=where) for axis in axes), where)
 
     @classmethod
     def from_spec(cls, spec: Mapping[str, Mapping[str, object]], *, where: str = "") -> Self:
@@ -345,10 +291,10 @@ class Grid:
         )
 
     @classmethod
-    def _located(cls, axes: tuple[Axis, ...], where: str, arms: tuple[str, ...] = ()) -> Self:
-        """Return the grid of these axes and arms; errors name their source."""
+    def _located(cls, axes: tuple[Axis, ...], where: str) -> Self:
+        """Return the grid of these axes; errors name their source."""
         try:
-            return cls(axes, arms)
+            return cls(axes)
         except GridError as error:
             text = str(error).removeprefix("grid: ") if where.endswith("'grid'") else str(error)
             raise GridError(f"{where}: {text}" if where else text) from None

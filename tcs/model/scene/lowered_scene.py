@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from tcs.kernel.arrays import Chain, GridArrays, SceneArrays, Shapes
+from tcs.kernel.arrays import BoolArray, Chain, GridArrays, SceneArrays, Shapes
 
 T = TypeVar("T", SceneArrays, GridArrays)
 
@@ -29,6 +29,8 @@ class LoweredScene:
         environment_bodies: Names of the bodies of the environment, by the index `body` of its
             shapes.
         goals: Names of the goals, in order.
+        body_shapes: Whether a shape of the robot that is not of the scored arm is in the arrays,
+            None for all.
     """
 
     arrays: SceneArrays
@@ -36,6 +38,7 @@ class LoweredScene:
     robot_bodies: tuple[str, ...]
     environment_bodies: tuple[str, ...]
     goals: tuple[str, ...]
+    body_shapes: BoolArray | None = None
 
     def digest(self) -> str:
         """Return the SHA-256 of all arrays and names, as hexadecimal digits.
@@ -83,6 +86,7 @@ def without_bodies(lowered: LoweredScene, names: Collection[str]) -> LoweredScen
             arm_vs_body=arrays.arm_vs_body[:, kept],
             body_vs_environment=arrays.body_vs_environment[kept],
         ),
+        body_shapes=kept,
     )
 
 

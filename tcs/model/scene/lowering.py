@@ -273,10 +273,14 @@ def torso_at(lowered: LoweredScene, scene: Scene, levels: Iterable[float]) -> Sc
     finally:
         scene.restore(before)
     arm_bases = _matrices([arm_base])
+    kept = slice(None) if lowered.body_shapes is None else lowered.body_shapes
     return lowered.arrays._replace(
         arm_base_R=_rotations(arm_bases)[0],
         arm_base_p=_origins(arm_bases)[0],
-        body=lowered.arrays.body._replace(R=_rotations(poses), p=_origins(poses)),
+        body=lowered.arrays.body._replace(
+            R=np.ascontiguousarray(_rotations(poses)[:, kept]),
+            p=np.ascontiguousarray(_origins(poses)[:, kept]),
+        ),
     )
 
 

@@ -23,6 +23,15 @@ class Hand:
     other: tuple[str, str] | None = None
     """Arm and tool of the goal that is reached at the same time; None for a goal by itself."""
 
+    @property
+    def name(self) -> str:
+        """Arm and tool as one name.
+
+        >>> Hand("right", "spoon").name, Hand("left").name, Hand().name
+        ('right+spoon', 'left', 'bare')
+        """
+        return "+".join(part for part in (self.arm, self.tool) if part) or "bare"
+
     def __str__(self) -> str:
         """Return the hand in words.
 

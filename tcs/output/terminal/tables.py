@@ -13,7 +13,7 @@ from rich.table import Table
 
 from tcs.output.terminal.console import results_console
 from tcs.output.words import (
-    ARM,
+    HAND,
     REASON_TEXTS,
     axis_name,
     axis_title,
@@ -24,6 +24,7 @@ from tcs.output.words import (
     frame_name,
     goal_list,
     goal_text,
+    hands_text,
     percentage,
     person_text,
     place_in_line,
@@ -290,7 +291,8 @@ def _alternatives_table(result: Mapping[str, Any]) -> Table:
     )
     for number, one in enumerate((result, *result["alternatives"]), 1):
         poses = "; ".join(
-            f"{m['base_x']:.2f} {m['base_y']:.2f} {m['base_yaw_deg']:.0f} {m.get(ARM, '')}".rstrip()
+            f"{m['base_x']:.2f} {m['base_y']:.2f} {m['base_yaw_deg']:.0f} "
+            f"{hands_text(m.get(HAND, ()))}".rstrip()
             for m in one["members"]
         )
         trades = one.get("trades")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,18 +14,19 @@ from scipy.interpolate import CubicHermiteSpline
 
 from tcs.files.writing import whole_file
 from tcs.kernel.arrays import FloatArray
+from tcs.model.scene import Scene
 from tcs.motion import MotionPlan, StopPlan
-from tcs.motion.plan_check import check_names
+from tcs.motion.plan_check import hands_of
 from tcs.output.report.score.pictures import job_title
 from tcs.output.view.animation import play_poses, play_visible
 from tcs.output.view.export import overlay, static_page, swatch
 from tcs.output.view.live import open_meshcat, stay_open, wait
-from tcs.output.view.scene_objects import SceneShapes, arrow_path
+from tcs.output.view.scene_objects import SceneShapes, arrow_path, place
 from tcs.output.view.scene_page import ScenePage
 from tcs.output.view.swept import swept_mesh
 from tcs.output.words import REASON_COLOURS, base_pose_text, goals_text
 from tcs.output.words.motions import not_done_text
-from tcs.placement.scoring.rebuild import rebuild_made_from
+from tcs.placement.scoring.job import whole_task
 from tcs.placement.tables import Reason
 
 RATE = 15
@@ -66,6 +67,12 @@ class PlanView:
     """Whether the robot is shown with its meshes instead of its collision shapes."""
     swept: bool
     """Whether the volume that the arm sweeps is shown."""
+    scenes: Mapping[str, Scene]
+    """The scene of each hand, by its name. That of the first one is shown, with all arms."""
+
+    def arm_of(self, stop: StopPlan) -> tuple[str, ...]:
+        """Return the joints of the arm that moves at a stop; () for that of the shown scene."""
+        return () if stop.hand == next(iter(self.scenes)) else stop.joints
 
     @property
     def lines(self) -> list[str]:
@@ -94,10 +101,18 @@ def make_plan_view(plan: MotionPlan, *, meshes: bool = False, swept: bool = Fals
         StoreMismatchError: If the models have changed since the plan was made.
         StoreFormatError: If it names goals, joints or axes that its scene does not have.
     """
-    job, scene = rebuild_made_from(plan.made_from, meshes=meshes)
-    check_names(plan, job)
-    shapes = SceneShapes(scene, job.task, meshes=meshes)
-    return PlanView(plan, shapes, job_title(job), job.spec.robot.source, meshes, swept)
+    hands = hands_of(plan, meshes=meshes)
+    job, scene, _ = next(iter(hands.values()))
+    shapes = SceneShapes(scene, whole_task([hand.job for hand in hands.values()]), meshes=meshes)
+    return PlanView(
+        plan,
+        shapes,
+        job_title(job),
+        job.spec.robot.source,
+        meshes,
+        swept,
+        {name: hand.scene for name, hand in hands.items()},
+    )
 
 
 def plan_frames(plan: MotionPlan, rate: float) -> tuple[Frame, ...]:
@@ -136,7 +151,11 @@ def show_plan(view: PlanView, meshcat: Meshcat, *, compact: bool = False) -> Non
     shapes.draw(meshcat, arrows, [stop.at for stop in plan.stops], compact=compact)
     for arrow in arrows:
         meshcat.SetProperty(arrow_path(arrow), "visible", True)
-    shots = [shapes.poses(plan.stops[one.stop].at, one.joints, one.goal) for one in frames]
+    stops = plan.stops
+    shots = [
+        shapes.poses(stops[one.stop].at, one.joints, one.goal, view.arm_of(stops[one.stop]))
+        for one in frames
+    ]
     for path, pose in shots[0].items():
         meshcat.SetTransform(path, RigidTransform(pose))
     animation = MeshcatAnimation(rate)
@@ -219,12 +238,12 @@ def _play_swept(
     view: PlanView, meshcat: Meshcat, animation: MeshcatAnimation, frames: Sequence[Frame]
 ) -> None:
     """Add the volume that the arm sweeps at each stop, shown while the stop is."""
-    shapes = view.shapes
     for number, stop in enumerate(view.plan.stops):
         if not stop.segments:
             continue
-        shapes.poses(stop.at, None, 0)
-        corners, faces = swept_mesh(shapes.scene, stop.samples().positions)
+        scene = view.scenes[stop.hand]
+        place(scene, stop.at)
+        corners, faces = swept_mesh(scene, stop.samples().positions)
         path = f"{_SWEPT}/{number}"
         meshcat.SetTriangleMesh(path, corners, faces, _SWEPT_COLOUR)
         meshcat.SetProperty(path, "visible", number == frames[0].stop)

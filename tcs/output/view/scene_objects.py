@@ -58,6 +58,14 @@ class Snapshot:
     """The visible arrows, one for each goal."""
 
 
+def place(scene: Scene, at: InitialConfiguration) -> None:
+    """Set robot and environment of a scene to a configuration; the arm stays as it is."""
+    for name, value in at.environment:
+        scene.set_joint(name, value)
+    scene.place_base(at.base_x, at.base_y, at.base_yaw)
+    scene.set_torso(at.torso)
+
+
 class SceneShapes:
     """The objects of one scene, whatever is shown of it."""
 
@@ -74,9 +82,14 @@ class SceneShapes:
         self._outline = base_outline(scene)
         self._robot = robot_shapes(scene, meshes)
         self._environment = _environment_shapes(scene)
+        self._parked = scene.positions()
 
     def poses(
-        self, at: InitialConfiguration, joints: ArrayLike | None, goal: int
+        self,
+        at: InitialConfiguration,
+        joints: ArrayLike | None,
+        goal: int,
+        arm: Sequence[str] = (),
     ) -> dict[str, FloatArray]:
         """Return the poses of all objects in their parents, shapes (3, 4).
 
@@ -84,13 +97,15 @@ class SceneShapes:
             at: Robot and environment.
             joints: The arm [rad], shape (7,); None for its rest posture.
             goal: The goal that is marked.
+            arm: Names of the joints of another arm, if `joints` are of that.
         """
         scene = self.scene
-        for name, value in at.environment:
-            scene.set_joint(name, value)
-        scene.place_base(at.base_x, at.base_y, at.base_yaw)
-        scene.set_torso(at.torso)
-        scene.set_arm(scene.resting_arm() if joints is None else joints)
+        # An arm that was shown at a goal before is parked again.
+        scene.restore(self._parked)
+        place(scene, at)
+        scene.set_arm(scene.resting_arm() if joints is None or arm else joints)
+        if arm and joints is not None:
+            scene.set_robot_joints(arm, joints)
         plant, context = scene.built.plant, scene.plant_context
         X_WB = scene.base_pose()
         poses = {ROBOT: X_WB}
@@ -154,7 +169,15 @@ class SceneShapes:
 class SceneObjects(SceneShapes):
     """The objects of the scene of a score file."""
 
-    def __init__(self, scene: Scene, task: Task, viewed: ViewedSet, *, meshes: bool) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        task: Task,
+        viewed: ViewedSet,
+        *,
+        meshes: bool,
+        arms: Sequence[Sequence[str]] = (),
+    ) -> None:
         """Read the objects of a scene.
 
         Args:
@@ -162,9 +185,10 @@ class SceneObjects(SceneShapes):
             task: Its task.
             viewed: The scores and the set.
             meshes: Whether the robot is shown as its meshes, or as its collision shapes.
+            arms: Names of the arm joints of each hand.
         """
         super().__init__(scene, task, meshes=meshes)
-        self._viewed = viewed
+        self._viewed, self._arms = viewed, arms
 
     def snapshot(self, index: int, goal: int) -> Snapshot:
         """Return the poses at a configuration, with the arm at a goal if it is reached.
@@ -174,7 +198,13 @@ class SceneObjects(SceneShapes):
             goal: The goal that is shown. If it is not reached, the arm is in its rest posture.
         """
         result = self._viewed.result(index)
-        poses = self.poses(result.configuration, self._viewed.joints(index, goal), goal)
+        hand = self._viewed.hand(index, goal)
+        poses = self.poses(
+            result.configuration,
+            self._viewed.joints(index, goal),
+            goal,
+            self._arms[hand] if hand else (),
+        )
         return Snapshot(poses, frozenset(enumerate(result.reasons)))
 
     def set_up(self, meshcat: Meshcat, arrows: Iterable[Arrow], *, compact: bool = False) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 from tcs.files.writing import whole_file
 from tcs.model.grid import InitialConfiguration
 from tcs.output.report.score.pictures import title_of
-from tcs.output.report.score.scored_scenes import scored_scene
+from tcs.output.report.score.scored_scenes import scored_scenes
 from tcs.output.report.score.shown_set import ShownSet
 from tcs.output.view.export import export_page
 from tcs.output.view.live import Viewer, open_meshcat, stay_open
@@ -61,11 +61,18 @@ def make_score_view(
         SelectionError: If there is no such set.
     """
     shown = ShownSet.of(file, here, max_members, observed, refined=refined)
-    job, scene = scored_scene(file, shown, meshes=meshes)
+    hands = scored_scenes(file, shown, meshes=meshes)
+    job, scene = hands[0]
     viewed = ViewedSet.of_shown(shown)
     return ScoreView(
         viewed=viewed,
-        objects=SceneObjects(scene, job.task, viewed, meshes=meshes),
+        objects=SceneObjects(
+            scene,
+            job.task,
+            viewed,
+            meshes=meshes,
+            arms=[tuple(of_hand.job.spec.robot.arm_joints) for of_hand in hands],
+        ),
         title=title_of(job, file),
         subtitle=shown.subtitle,
         source=job.spec.robot.source,

@@ -178,6 +178,11 @@ class ViewedSet:
         scores, row = self._row(index)
         return scores.joints_of(row, goal)
 
+    def hand(self, index: int, goal: int) -> int:
+        """Return the number of the hand that reaches a goal."""
+        scores, row = self._row(index)
+        return 0 if scores.hand is None else int(scores.hand[row, goal])
+
     def environment_state(self, index: int) -> int:
         """Return the number of a configuration's environment state, in C order over its axes."""
         return self.on_grid(index) // (self.grid.size // math.prod(self.grid.environment_shape))

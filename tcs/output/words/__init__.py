@@ -16,14 +16,14 @@ from tcs.output.words.answers import (
 from tcs.output.words.assignment import assign_goals, assigned_goals
 from tcs.output.words.bodies import body_name, frame_name, pair_text
 from tcs.output.words.configurations import (
-    ARM,
-    arm_text,
+    HAND,
     axis_name,
     axis_title,
     axis_unit,
     axis_value,
     base_pose_text,
     deviation_text,
+    hands_text,
     member_text,
     quantity,
     setting_text,
@@ -61,13 +61,12 @@ from tcs.output.words.reasons import (
 )
 
 __all__ = [
-    "ARM",
+    "HAND",
     "REACHABILITY_LABEL",
     "REASON_COLOURS",
     "REASON_NAMES",
     "REASON_TEXTS",
     "RelativePlace",
-    "arm_text",
     "assign_goals",
     "assigned_goals",
     "axis_name",
@@ -92,6 +91,7 @@ __all__ = [
     "goal_text",
     "goals_by_reason",
     "goals_text",
+    "hands_text",
     "manipulability_label",
     "member_places",
     "member_text",

@@ -6,13 +6,13 @@ key ends in `_deg`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from tcs.output.words.bodies import frame_name
 
-ARM = "arm"
-"""Key of the name of the arm, where configurations use one of several."""
+HAND = "hand"
+"""Key of the names of the hands that serve the goals, in files of several."""
 
 
 def axis_name(key: str) -> str:
@@ -36,19 +36,19 @@ def axis_title(key: str) -> str:
     >>> axis_title("head_rest_deg")
     'head rest [deg]'
     """
-    return ARM if key == ARM else f"{axis_name(key)} [{axis_unit(key)}]"
+    return "hands" if key == HAND else f"{axis_name(key)} [{axis_unit(key)}]"
 
 
-def axis_value(key: str, value: float | str) -> str:
+def axis_value(key: str, value: float | Sequence[str | None]) -> str:
     """Return a value without its unit: lengths in centimetres, angles in tenths of a degree.
 
-    The name of an arm is its own value.
+    The names of hands are those of `hands_text`.
 
     >>> axis_value("torso", 0.30000000000000004), axis_value("base_yaw_deg", -90.0)
     ('0.30', '270')
     """
-    if isinstance(value, str):
-        return value
+    if isinstance(value, Sequence):
+        return hands_text(value)
     if axis_unit(key) == "m":
         return f"{value:.2f}"
     if key == "base_yaw_deg":
@@ -80,20 +80,21 @@ def base_pose_text(member: Mapping[str, Any]) -> str:
     )
 
 
-def arm_text(arm: str) -> str:
-    """Return the name of an arm in words.
+def hands_text(names: Iterable[str | None]) -> str:
+    """Return the names of hands in words, each once; "" without any.
 
-    >>> arm_text("left")
-    'left arm'
+    >>> hands_text(["left", None, "left"]), hands_text(["left", "right+spoon"])
+    ('left hand', 'left and right+spoon hands')
     """
-    return f"{arm} arm"
+    used = list(dict.fromkeys(name for name in names if name))
+    return f"{' and '.join(used)} hand{'s' * (len(used) > 1)}" if used else ""
 
 
 def member_text(member: Mapping[str, Any]) -> str:
-    """Return the base pose, the torso height, the settings of the environment, and the arm.
+    """Return the base pose, the torso height, the settings of the environment, and the hands.
 
     Args:
-        member: A configuration, as `InitialConfiguration.to_json` returns it.
+        member: A member, as `tcs select --json` prints it.
 
     >>> member_text({"base_x": 1.4, "base_y": -1.2, "base_yaw_deg": 0.0, "torso": 0.1})
     'x 1.40 m, y -1.20 m, heading 0 deg, torso 0.10 m'
@@ -102,10 +103,10 @@ def member_text(member: Mapping[str, Any]) -> str:
     rest = [
         f"{axis_name(key)} {quantity(key, value)}"
         for key, value in member.items()
-        if not key.startswith("base_") and key != ARM
+        if not key.startswith("base_") and key != HAND
     ]
-    if ARM in member:
-        rest.append(arm_text(member[ARM]))
+    if HAND in member:
+        rest.append(hands_text(member[HAND]))
     return ", ".join([base_pose_text(member), *rest])
 
 

@@ -22,7 +22,10 @@ centres kept as float32 are rounded by 2e-7 m."""
 
 @dataclass(frozen=True, eq=False)
 class Postures:
-    """The robot at each candidate, and its arm in each stored solution; independent of a query."""
+    """The robot at each candidate, and its arm in each stored solution of a hand.
+
+    They are independent of a query.
+    """
 
     shapes: RobotShapes
     """The robot's shapes."""
@@ -32,6 +35,8 @@ class Postures:
     """Their grid."""
     scores: ScoreTable
     """The stored solutions."""
+    hand: int = 0
+    """Number of the hand of the shapes, whose solutions count."""
 
     @cached_property
     def base(self) -> FloatArray:
@@ -58,7 +63,7 @@ class Postures:
     @cached_property
     def pairs(self) -> tuple[IntArray, IntArray]:
         """Candidate and goal of each stored solution of a candidate, shapes (R,)."""
-        candidate, goal = np.nonzero(self.sets.reached)
+        candidate, goal = np.nonzero(self.sets.served == self.hand + 1)
         return candidate.astype(np.int64), goal.astype(np.int64)
 
     @cached_property

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -13,7 +12,7 @@ from joblib import Parallel, delayed
 from numpy.typing import ArrayLike, NDArray
 
 from tcs.errors import TcsError
-from tcs.kernel.arrays import IntArray
+from tcs.kernel.arrays import IntArray, SceneArrays
 from tcs.kernel.rows import Rows
 from tcs.kernel.sweep import gripper_contacts
 from tcs.model.people import Scale
@@ -23,8 +22,9 @@ from tcs.placement.population.kept_people import BLOCK, PROBES, KeptPeople
 from tcs.placement.population.problems import PersonProblems
 from tcs.placement.robustness.body_collisions import counted_pairs, counted_rests
 from tcs.placement.robustness.error_model import Offsets
-from tcs.placement.robustness.perturbed_scenes import PerturbedScenes, Run
-from tcs.placement.robustness.trials import ArmTrials, Progress, Trials
+from tcs.placement.robustness.perturbed_scenes import HandScenes, PerturbedScenes, Run
+from tcs.placement.robustness.trials import HandTrials, Progress, Trials
+from tcs.placement.scoring.together import Hands
 
 CHUNK = 500
 """People whose scenes are held in memory together: with errors, some ten megabytes for each state
@@ -37,23 +37,23 @@ Reasons = NDArray[np.uint8]
 
 
 class _Prepared(NamedTuple):
-    """One arm's scene for some people."""
+    """The scene of one hand for some people."""
 
     scenes: PeopleInScene
     problems: PersonProblems
+    goals: tuple[int, ...]
+    """Numbers of the goals that the hand may serve."""
     poses: Rows
-    rows: IntArray
-    """Rows of the configurations of this arm in the poses, shape (r,)."""
     place: IntArray
-    """Number of the environment state of each of these, shape (r,)."""
+    """Number of the environment state of each configuration, shape (m,)."""
     states: IntArray
     """Numbers of the states in which each person is, shape (people, s)."""
 
 
 def for_papers_man(trials: Trials) -> Trials:
     """Return trials whose scenes hold the papers' man, whoever was scored."""
-    arms = tuple(_with_papers_man(arm, trials) for arm in trials.arms)
-    return dataclasses.replace(trials, arms=arms)
+    hands = tuple(_with_papers_man(hand, trials) for hand in trials.hands)
+    return dataclasses.replace(trials, hands=hands)
 
 
 def reasons_for_people(
@@ -111,7 +111,10 @@ def reasons_for_people(
         prepared = list(_prepared(trials, poses, scales, columns, offsets))
         batches = [block[i : i + BATCH] for block in missing for i in range(0, block.size, BATCH)]
         parallel = Parallel(n_jobs=jobs, prefer="threads", return_as="generator")
-        work = (delayed(_evaluated)(prepared, scales, batch, first) for batch in batches)
+        work = (
+            delayed(_evaluated)(prepared, scales, batch, first, trials.together)
+            for batch in batches
+        )
         for batch, reasons in zip(batches, parallel(work), strict=True):
             found[:, batch] = reasons
             if batch[-1] == missing[0][-1]:
@@ -133,30 +136,34 @@ def _kept(
         return None
     some = np.arange(min(PROBES, len(scales)))
     seen = hashlib.sha256()
-    for arm in _prepared(trials, poses, scales, some, offsets):
-        for arrays in arm.scenes.arrays_of([scales[i] for i in some.tolist()], arm.states):
+    for hand in _prepared(trials, poses, scales, some, offsets):
+        for arrays in hand.scenes.arrays_of([scales[i] for i in some.tolist()], hand.states):
             seen.update(
-                dataclasses.replace(trials.arms[0].lowered, arrays=arrays).digest().encode()
+                dataclasses.replace(trials.hands[0].lowered, arrays=arrays).digest().encode()
             )
     return KeptPeople.of(
         trials.blocks, poses, scales, offsets, scenes=seen.hexdigest(), goals=trials.weights.size
     )
 
 
-def _with_papers_man(arm: ArmTrials, trials: Trials) -> ArmTrials:
-    """Return the robot in the environment with the papers' man in it."""
-    spec = arm.job.spec
+def _with_papers_man(hand: HandTrials, trials: Trials) -> HandTrials:
+    """Return the robot with a hand in the environment with the papers' man in it."""
+    spec = hand.job.spec
     if not spec.environment.has_body:
-        return arm
+        return hand
     person = spec.environment.person
     assert person is not None
     environment = spec.environment.model_copy(update={"person": person.without_body()})
     task = load_task(trials.file.metadata["task"])
-    job = dataclasses.replace(arm.job, task=task, spec=SceneSpec(spec.robot, environment))
+    if len(trials.hands) > 1:
+        goals = tuple(task.goals[goal] for goal in hand.goals)
+        task = dataclasses.replace(hand.job.task, goals=goals)
+    job = dataclasses.replace(hand.job, task=task, spec=SceneSpec(spec.robot, environment))
     scene = job.scene()
     lowered = job.lowered(scene)
     pairs = counted_pairs(scene, lowered, trials.body_collisions)
-    return ArmTrials(job, scene, counted_rests(lowered, trials.body_collisions), pairs)
+    rests = counted_rests(lowered, trials.body_collisions)
+    return HandTrials(job, scene, rests, pairs, hand.goals)
 
 
 def _prepared(
@@ -166,33 +173,29 @@ def _prepared(
     columns: IntArray,
     offsets: Offsets | None,
 ) -> Iterator[_Prepared]:
-    """Yield the scene of each arm that the configurations use, for some of the people."""
-    states_of_arm = trials.grid.arm_size // trials.grid.state_size
-    arm_of = poses.state // states_of_arm
-    for number in np.unique(arm_of):
-        arm = trials.arms[int(number)]
-        rows = np.flatnonzero(arm_of == number)
-        needed, place = np.unique(poses.state[rows], return_inverse=True)
-        positions: list[dict[str, float]] = []
-        states = []
-        for state in needed.tolist():
-            if offsets is None:
-                states.append(np.full(columns.size, len(positions)))
-                positions.append(trials.nominal(state))
-                continue
-            part = {name: values[columns] for name, values in offsets.items()}
-            of_joints, _ = trials.positions(state, part)
-            states.append(len(positions) + np.arange(columns.size))
-            positions += [
-                {name: float(values[i]) for name, values in of_joints.items()}
-                for i in range(columns.size)
-            ]
-        scenes = PeopleInScene(arm.lowered, arm.scene, arm.job.task, positions)
-        in_states = np.stack(states, axis=1)
+    """Yield the scene of each hand, for some of the people."""
+    needed, place = np.unique(poses.state, return_inverse=True)
+    positions: list[dict[str, float]] = []
+    states = []
+    for state in needed.tolist():
+        if offsets is None:
+            states.append(np.full(columns.size, len(positions)))
+            positions.append(trials.nominal(state))
+            continue
+        part = {name: values[columns] for name, values in offsets.items()}
+        of_joints, _ = trials.positions(state, part)
+        states.append(len(positions) + np.arange(columns.size))
+        positions += [
+            {name: float(values[i]) for name, values in of_joints.items()}
+            for i in range(columns.size)
+        ]
+    in_states = np.stack(states, axis=1)
+    for hand in trials.hands:
+        scenes = PeopleInScene(hand.lowered, hand.scene, hand.job.task, positions)
         (arrays,) = scenes.arrays_of([scales[int(columns[0])]], in_states[:1])
-        arrays = arrays._replace(body_vs_environment=arm.body_pairs[:, scenes.rows])
+        arrays = arrays._replace(body_vs_environment=hand.body_pairs[:, scenes.rows])
         problems = PersonProblems(arrays, str(trials.file.metadata["measure"]))
-        yield _Prepared(scenes, problems, poses, rows, place, in_states)
+        yield _Prepared(scenes, problems, hand.goals, poses, place.ravel(), in_states)
 
 
 def _evaluated(
@@ -200,22 +203,31 @@ def _evaluated(
     scales: Sequence[dict[str, Scale]],
     batch: IntArray,
     first: int,
+    together: Hands,
 ) -> Reasons:
     """Return the reasons for some people, shape (configurations, people, goals).
 
     Args:
-        prepared: The scenes of the arms, for the chunk of people.
+        prepared: The scenes of the hands, for the chunk of people.
         scales: Those of all people.
         batch: Numbers of the people.
         first: Number of the first person of the chunk.
+        together: The hands, to check arms that work at the same time against each other.
     """
     people = [scales[person] for person in batch.tolist()]
-    found: dict[int, list[NDArray[np.uint8]]] = defaultdict(list)
-    for arm in prepared:
-        for arrays in arm.scenes.arrays_of(people, arm.states[batch - first]):
-            problem = arm.problems.of(arrays)
-            scenes = PerturbedScenes(problem, gripper_contacts(problem))
-            for row, place in zip(arm.rows.tolist(), arm.place.tolist(), strict=True):
-                scores = scenes.scores(arm.poses, Run(row, place, place + 1))
-                found[row].append(scores.reason[0])
-    return np.array([found[row] for row in range(len(found))], dtype=np.uint8)
+    found: list[list[NDArray[np.uint8]]] = [[] for _ in prepared[0].place]
+    arrays_of_hands = (
+        hand.scenes.arrays_of(people, hand.states[batch - first]) for hand in prepared
+    )
+    for of_person in zip(*arrays_of_hands, strict=True):
+        scenes = PerturbedScenes(tuple(map(_hand_scenes, prepared, of_person)), together)
+        for row, place in enumerate(prepared[0].place.tolist()):
+            scores, _ = scenes.scores(prepared[0].poses, Run(row, place, place + 1))
+            found[row].append(scores.reason[0])
+    return np.array(found, dtype=np.uint8)
+
+
+def _hand_scenes(hand: _Prepared, arrays: SceneArrays) -> HandScenes:
+    """Return the states of one person's scene for one hand."""
+    problem = hand.problems.of(arrays)
+    return HandScenes(problem, gripper_contacts(problem), hand.goals)

@@ -68,15 +68,10 @@ class Change:
 def changes_between(
     before: InitialConfiguration, after: InitialConfiguration
 ) -> tuple[Change, ...]:
-    """Return the changes between two configurations of the same axes, in the order of the axes.
-
-    The arm is not an axis.
-    """
+    """Return the changes between two configurations of the same axes, in the order of the axes."""
     start, end = before.to_json(), after.to_json()
     changes = []
     for axis, value in end.items():
-        if axis == "arm":
-            continue
         change = value - start[axis]
         if axis == "base_yaw_deg":
             change = math.remainder(change, 360.0)
@@ -101,7 +96,11 @@ def ahead_and_left(
 
 
 def sentence(
-    before: InitialConfiguration, after: InitialConfiguration, *, around: float | None = None
+    before: InitialConfiguration,
+    after: InitialConfiguration,
+    *,
+    around: float | None = None,
+    hand: str = "",
 ) -> str:
     """Return the changes as one sentence, with forward and left as seen from the first base.
 
@@ -109,6 +108,7 @@ def sentence(
         before: The configuration before the changes.
         after: The configuration after them.
         around: Length of the path around the furniture [m], to be stated in the sentence.
+        hand: The hand to use instead in words, if it is another one.
 
     >>> here = InitialConfiguration(base_x=1.0, base_y=0.0, base_yaw=0.0, torso=0.15)
     >>> there = InitialConfiguration(base_x=0.93, base_y=0.1, base_yaw=-0.7853981634, torso=0.3)
@@ -130,8 +130,8 @@ def sentence(
         for change in changes_between(before, after)
         if change.axis not in ("base_x", "base_y") and change.is_noticeable
     ]
-    if before.arm is not None and after.arm != before.arm:
-        steps.append(f"use the {after.arm} arm")
+    if hand:
+        steps.append(f"use the {hand}")
     if not steps:
         return "Nothing needs to change."
     text = ", ".join(steps)

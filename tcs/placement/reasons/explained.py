@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -32,8 +31,8 @@ class ExplainedConfiguration:
     """The two bodies in contact, if any; for the arm, those of its best posture."""
     dexterity: float
     """Dexterity at the goal; 0 if it is not reached."""
-    of_arms: tuple[int, ...]
-    """Flat indices by every arm, where none was stated of several; else the index alone."""
+    hand: int
+    """Number of the hand that reaches the goal, comes nearest to it, or was asked about."""
 
     @classmethod
     def of(
@@ -45,22 +44,15 @@ class ExplainedConfiguration:
             grid: The grid that was scored.
             scores: Its scores.
             goal: Number of the goal.
-            requested: Flat index, or a configuration of which the nearest one of the grid is taken:
-                by its arm, or by the first arm that reaches the goal.
+            requested: Flat index, or a configuration of which the nearest one of the grid is taken.
 
         Raises:
             GridError: If there is no configuration of that index.
             SelectionError: If a value is not finite, or an axis is missing or exceeded.
             UnknownNameError: If an environment axis has no such name.
         """
-        of_arms: tuple[int, ...] = ()
         if isinstance(requested, InitialConfiguration):
             index, stated = nearest_configuration(grid, requested)
-            if requested.arm is None and grid.arms:
-                # The first arm that reaches the goal, else the first.
-                of_arms = tuple(range(index, grid.size, grid.arm_size))
-                index = of_arms[int(np.argmax(scores.reached[list(of_arms), goal]))]
-                stated = dataclasses.replace(stated, arm=grid.arm_of(index))
         else:
             index, stated = int(requested), grid.configuration(requested)
         pair = int(scores.pair[index, goal])
@@ -71,7 +63,7 @@ class ExplainedConfiguration:
             reason=Reason(scores.reason[index, goal]),
             pair=scores.pair_names[pair] if pair >= 0 else None,
             dexterity=float(scores.dexterity[index, goal]),
-            of_arms=of_arms or (index,),
+            hand=0 if scores.hand is None else int(scores.hand[index, goal]),
         )
 
     @property
@@ -109,8 +101,7 @@ def nearest_configuration(
             single value any value is accepted.
 
     Returns:
-        Its flat index, by the first arm unless one is stated, and the stated configuration with its
-        axes in the order of the grid.
+        Its flat index, and the stated configuration with its axes in the order of the grid.
 
     Raises:
         SelectionError: If a value is not finite, or an axis is missing or exceeded.
@@ -125,7 +116,7 @@ def nearest_configuration(
         )
     values = current_values(stated, grid, ())
     along = [_nearest_value(axis, values[axis.name]) for axis in grid.axes]
-    index = int(grid.flat(along, stated.arm))
+    index = int(grid.flat(along))
     ordered = InitialConfiguration(
         base_x=values["base_x"],
         base_y=values["base_y"],
@@ -133,7 +124,6 @@ def nearest_configuration(
         torso=values["torso"],
         environment=tuple((axis.name, values[axis.name]) for axis in grid.environment_axes),
         environment_units=tuple(axis.held_unit for axis in grid.environment_axes),
-        arm=stated.arm,
     )
     return index, ordered
 

@@ -13,6 +13,7 @@ from tcs.model.grid import InitialConfiguration
 from tcs.placement.reasons.distribution import Distribution
 from tcs.placement.reasons.explained import ExplainedConfiguration
 from tcs.placement.reasons.fix import Fix, fix_weights, nearest_fix
+from tcs.placement.reasons.of_hands import with_hand
 from tcs.placement.selection import (
     Match,
     SelectionTables,
@@ -90,7 +91,7 @@ class Explanation:
             "observed": state_to_json(axes, self.match.state),
             "observed_error": state_to_json(axes, self.match.observed_error),
             **({"frames": frames} if (frames := self.match.to_json().get("frames")) else {}),
-            "explained": None if self.explained is None else self.explained.to_json(),
+            "explained": None if self.explained is None else self._explained_to_json(),
             "best_set": {
                 "configurations": list(self.best_set),
                 "reaching": list(self.best_reaching),
@@ -112,6 +113,14 @@ class Explanation:
             "unreachable": self.unreachable,
             "nearest_reaching": None if self.fix is None else self.fix.to_json(),
         }
+
+    def _explained_to_json(self) -> dict[str, Any]:
+        """Return the explained configuration, with the name of its hand in a file of several."""
+        assert self.explained is not None
+        plain = self.explained.to_json()
+        if self.file.hands:
+            plain["hand"] = self.file.hand_names[self.explained.hand]
+        return plain
 
 
 def explain(
@@ -168,6 +177,7 @@ def explain(
     fix, unreachable = None, 0
     if explained is not None:
         fix, unreachable = nearest_fix(grid, scores, table.sets.lattice, goal, explained, weights)
+        fix = with_hand(file, scores, goal, fix, explained)
     refined, refined_reaching = _recommended_refined(file, match.index, goal)
     return Explanation(
         file=file,

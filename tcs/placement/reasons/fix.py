@@ -58,8 +58,9 @@ class Fix:
     reached: tuple[int, ...]
     """All goals it reaches."""
     lost: tuple[int, ...]
-    """Goals reached from the explained configuration and not from this one, by any arm where none
-    was stated."""
+    """Goals reached from the explained configuration and not from this one."""
+    hand: str = ""
+    """The hand to use in words, if it is another one than the explained one."""
 
     @property
     def changes(self) -> tuple[Change, ...]:
@@ -72,7 +73,7 @@ class Fix:
         straight = math.hypot(*ahead_and_left(self.start, self.configuration))
         is_detour = self.route == "around" and self.driving > DETOUR * straight
         around = self.driving if is_detour else None
-        return sentence(self.start, self.configuration, around=around)
+        return sentence(self.start, self.configuration, around=around, hand=self.hand)
 
     def to_json(self) -> dict[str, Any]:
         """Return the configuration and the changes as plain containers."""
@@ -170,13 +171,7 @@ def nearest_fix(
     unreachable = int(np.count_nonzero(~legs.reachable))
     if unreachable == len(rows):
         return None, unreachable
-    held = scores.reached[list(start.of_arms)].any(axis=0)
-    # By any arm, where the start is of any arm.
-    to_arms = np.array(start.of_arms) - start.index
-    first = rows
-    if len(start.of_arms) > 1:
-        first, to_arms = rows % grid.arm_size, np.array(start.of_arms) - start.of_arms[0]
-    kept = scores.reached[first[:, None] + to_arms].any(axis=1)
+    held, kept = scores.reached[start.index], scores.reached[rows]
     losses = np.count_nonzero(held & ~kept, axis=1)
     cost[losses > losses[np.isfinite(cost)].min()] = np.inf
     near = np.flatnonzero(cost <= cost.min() + TIE)

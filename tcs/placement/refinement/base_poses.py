@@ -18,7 +18,6 @@ from tcs.placement.refinement.objectives import ScoreObjective
 from tcs.placement.refinement.poses import PoseScene, PoseScorer
 from tcs.placement.refinement.search import LocalSearch
 from tcs.placement.refinement.space import Space
-from tcs.placement.tables import Points
 
 FloorRange = tuple[tuple[float, float], tuple[float, float]]
 """Least and greatest x, and y, of the base [m]."""
@@ -155,7 +154,7 @@ def _best(scorer: PoseScorer, scene: PoseScene, fineness: Fineness) -> list[Scor
     grid = scorer.grid
     values = np.stack([*grid.values(np.arange(grid.size)).values()], axis=1)
     few = _screened(scorer, scene, values, fineness)
-    scores = scorer.score(_points(values[few]))
+    scores = scorer.score(values[few])
     counts = scores.reached.sum(axis=1)
     order = np.lexsort((-scores.dexterity.mean(axis=1), -counts))
     goals = scorer.problem.goal_p.shape[1]
@@ -186,7 +185,7 @@ def _refined(scorer: PoseScorer, starts: Sequence[tuple[int, ...]]) -> list[Scor
         )
         walks, _ = search.run(starts, ROUNDS, lambda done, total: None)
         values = np.concatenate([walk.present.values for walk in walks])
-        scores = scorer.score(_points(values))
+        scores = scorer.score(values)
         best = int(np.argmax(scores.reached.sum(axis=1)))
         missed = np.setdiff1d(np.flatnonzero(~scores.reached[best]), chosen)
         if not missed.size:
@@ -222,7 +221,7 @@ def _screened(
     for goal in _far_apart(scorer.problem.goal_p[0], scorer.problem.goal_R[0]):
         if alive.size <= fineness.screened:
             break
-        found = scorer.of_goals([goal]).score(_points(values[alive]))
+        found = scorer.of_goals([goal]).score(values[alive])
         reached[alive] += found.reached[:, 0]
         dexterity_sum[alive] += found.dexterity[:, 0]
         alive = alive[reached[alive] == reached[alive].max()]
@@ -268,7 +267,3 @@ def _far_apart(p: FloatArray, R: FloatArray, most: int = FEW) -> list[int]:
         nearest[last] = -1.0
         chosen.append(int(np.argmax(nearest)))
     return chosen
-
-
-def _points(values: FloatArray) -> Points:
-    return Points(values, np.zeros(len(values), dtype=np.int64))

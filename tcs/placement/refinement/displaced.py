@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.model.grid import ROBOT_AXES
 from tcs.placement.refinement.points import PointScorer
-from tcs.placement.tables import Points
 
 RADIUS = 0.05
 """Greatest displacement of the base on the floor [m]."""
@@ -57,11 +56,10 @@ class DisplacedBases:
         """Return some of the samples."""
         return dataclasses.replace(self, offsets=self.offsets[rows])
 
-    def reached(self, points: Points) -> BoolArray:
+    def reached(self, points: FloatArray) -> BoolArray:
         """Return which goals each configuration reaches in each sample, shape (n, samples, G)."""
-        count, axes = points.values.shape
+        count, axes = points.shape
         first = axes - len(ROBOT_AXES)
-        values = np.repeat(points.values[:, None], self.samples, axis=1)
+        values = np.repeat(points[:, None], self.samples, axis=1)
         values[:, :, first : first + 3] += self.offsets
-        flat = Points(values.reshape(-1, axes), np.repeat(points.arm, self.samples))
-        return self.scorer.score(flat).reached.reshape(count, self.samples, -1)
+        return self.scorer.score(values.reshape(-1, axes)).reached.reshape(count, self.samples, -1)

@@ -14,7 +14,6 @@ from tcs.placement.robustness import Evaluation, PerturbedPoints, Trials
 from tcs.placement.robustness.displacements import displaced
 from tcs.placement.robustness.trials import Errors
 from tcs.placement.store import ScoreFile, state_to_json
-from tcs.placement.tables import Points
 
 
 def evaluate_refined(
@@ -66,14 +65,12 @@ def evaluate_refined(
     size = int(refined.sizes[row])
     origin = refined.origin[row, :size].astype(np.int64)
     values = refined.values[row, :size]
-    points = Points(values, origin // file.configurations.arm_size)
-    reached = np.logical_or.reduce(PerturbedPoints(trials, offsets, jobs).reached(points), axis=0)
+    reached = np.logical_or.reduce(PerturbedPoints(trials, offsets, jobs).reached(values), axis=0)
     limited = np.zeros(samples, dtype=np.bool_)
     axes = file.configurations.environment_axes
     for member in values:
         at = {axis.name: float(v) for axis, v in zip(axes, member, strict=False)}
-        arm = trials.arms[0]
-        limited |= displaced(arm.job, arm.scene, {**trials.observed, **at}, offsets)[1]
+        limited |= displaced(trials.job, trials.scene, {**trials.observed, **at}, offsets)[1]
     for array in (reached, *offsets.values()):
         array.flags.writeable = False
     return Evaluation(
@@ -95,7 +92,7 @@ def evaluate_refined(
         about={
             "task": trials.job.task.name,
             "environment": trials.job.spec.environment.name,
-            "robot": trials.job.spec.robot.name,
+            "robot": file.robot["name"],
         },
         members=tuple(member.to_json() for member in refined.members(file.configurations, row)),
     )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.placement.refinement.objectives import Samples
 from tcs.placement.refinement.search import Walk
-from tcs.placement.tables import Points, tc_reachability
+from tcs.placement.tables import tc_reachability
 
 HARDEST = 8
 """One in so many samples screens sets during the search: those with the largest errors."""
@@ -32,18 +32,20 @@ class SuccessFloor:
     """Least success of a single configuration, and of a set of more, shape (2,)."""
 
     @classmethod
-    def of(cls, samples: Samples, weights: FloatArray, single: Points, best: Points) -> Self:
+    def of(
+        cls, samples: Samples, weights: FloatArray, single: FloatArray, best: FloatArray
+    ) -> Self:
         """Return the floor that the best single configuration and the best set of the grid give."""
         least = successes(samples, weights, [single, best])
         return cls(samples, weights, least)
 
-    def keeps(self, sets: Sequence[Points]) -> BoolArray:
+    def keeps(self, sets: Sequence[FloatArray]) -> BoolArray:
         """Return which sets are at least as sure as the best of the grid, shape (n,)."""
         found = successes(self.samples, self.weights, sets)
-        size = np.array([len(points.values) > 1 for points in sets], dtype=np.int64)
+        size = np.array([len(points) > 1 for points in sets], dtype=np.int64)
         return np.asarray(found >= self.least[size] - SLACK)
 
-    def keeps_of_sets(self, sets: Sequence[Points]) -> BoolArray:
+    def keeps_of_sets(self, sets: Sequence[FloatArray]) -> BoolArray:
         """Return which sets are at least as sure as the best set of the grid, whatever their size.
 
         Returns:
@@ -52,17 +54,13 @@ class SuccessFloor:
         return np.asarray(successes(self.samples, self.weights, sets) >= self.least[1] - SLACK)
 
 
-def successes(samples: Samples, weights: FloatArray, sets: Sequence[Points]) -> FloatArray:
+def successes(samples: Samples, weights: FloatArray, sets: Sequence[FloatArray]) -> FloatArray:
     """Return the mean of P_R of sets over samples, shape (n,)."""
-    flat = Points(
-        np.concatenate([points.values for points in sets]),
-        np.concatenate([points.arm for points in sets]),
-    )
+    flat = np.concatenate(list(sets))
     # Sets that were drawn around one another share members.
-    rows = np.column_stack([flat.arm, flat.values])
-    _, first, which = np.unique(rows, axis=0, return_index=True, return_inverse=True)
-    reached = samples.reached(Points(flat.values[first], flat.arm[first]))
-    ends = np.cumsum([len(points.values) for points in sets])
+    _, first, which = np.unique(flat, axis=0, return_index=True, return_inverse=True)
+    reached = samples.reached(flat[first])
+    ends = np.cumsum([len(points) for points in sets])
     members = np.split(which.ravel(), ends[:-1])
     return np.array(
         [tc_reachability(np.logical_or.reduce(reached[of]), weights).mean() for of in members]
@@ -76,7 +74,7 @@ class RememberedSamples:
     of: Samples
     """The samples."""
     known: dict[bytes, BoolArray] = field(default_factory=dict)
-    """Goals that a configuration reaches in each sample, by its arm and values."""
+    """Goals that a configuration reaches in each sample, by its values."""
 
     @property
     def samples(self) -> int:
@@ -96,13 +94,13 @@ class RememberedSamples:
         """Return some of the samples."""
         return type(self)(self.of.only(rows))
 
-    def reached(self, points: Points) -> BoolArray:
+    def reached(self, points: FloatArray) -> BoolArray:
         """Return which goals each configuration reaches in each sample, shape (n, samples, G)."""
-        keys = [row.tobytes() for row in np.column_stack([points.arm, points.values])]
+        keys = [row.tobytes() for row in points]
         missing = {key: i for i, key in enumerate(keys) if key not in self.known}
         if missing:
             rows = np.array(list(missing.values()))
-            found = self.of.reached(Points(points.values[rows], points.arm[rows]))
+            found = self.of.reached(points[rows])
             self.known.update(zip(missing, found, strict=True))
         return np.stack([self.known[key] for key in keys])
 
@@ -142,7 +140,7 @@ def at_surest(walks: Sequence[Walk], samples: Samples, weights: FloatArray) -> l
     Returns:
         The walks, the surest first.
     """
-    courses = [[place.points for place, _ in walk.course] for walk in walks]
+    courses = [[place.values for place, _ in walk.course] for walk in walks]
     found = successes(samples, weights, [points for course in courses for points in course])
     ends = np.cumsum([len(course) for course in courses])
     reached = []
@@ -168,7 +166,7 @@ def _settled(walks: Sequence[Walk], floor: SuccessFloor) -> list[Walk]:
     tried = [len(walk.passed) for walk in walks]
     open_ = list(range(len(walks)))
     while open_:
-        keeps = floor.keeps([walks[k].course[tried[k]][0].points for k in open_])
+        keeps = floor.keeps([walks[k].course[tried[k]][0].values for k in open_])
         for k, kept in zip(open_, keeps, strict=True):
             (keeping if kept else failing)[k] = tried[k]
             tried[k] = (keeping[k] + failing[k]) // 2

@@ -20,8 +20,16 @@ KEY = "refinement"
 """Entry of the metadata: for each table, None or the settings and figures of its refinement."""
 
 
-def as_table(walks: Sequence[Walk], weights: np.ndarray[Any, Any]) -> RefinedTable:
-    """Return refined sets as one table, in their order."""
+def as_table(
+    walks: Sequence[Walk], weights: np.ndarray[Any, Any], *, has_hands: bool
+) -> RefinedTable:
+    """Return refined sets as one table, in their order.
+
+    Args:
+        walks: The refined sets.
+        weights: Weights of the goals, sum 1, shape (G,).
+        has_hands: Whether the file is of several hands.
+    """
     width = max(walk.members for walk in walks)
 
     def filled(arrays: Sequence[np.ndarray[Any, Any]], fill: float) -> np.ndarray[Any, Any]:
@@ -37,6 +45,7 @@ def as_table(walks: Sequence[Walk], weights: np.ndarray[Any, Any]) -> RefinedTab
         reached=filled([walk.present.reached for walk in walks], False),
         dexterity=filled([walk.present.dexterity for walk in walks], 0.0),
         arm_joints=filled([walk.present.joints for walk in walks], 0.0),
+        hand=filled([walk.present.hand for walk in walks], 0) if has_hands else None,
         objective=np.array([walk.value for walk in walks]),
         weights=weights,
     )

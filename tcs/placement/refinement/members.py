@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
 from tcs.errors import SelectionError
 from tcs.model.grid import InitialConfiguration
 from tcs.placement.refinement.points import PointScorer
 from tcs.placement.store import ScoreFile
-from tcs.placement.tables import Points, RefinedSet, RefinedTable, ScoreTable
+from tcs.placement.tables import RefinedSet, RefinedTable, ScoreTable
 
 
 class RefinedMembers(NamedTuple):
@@ -50,8 +48,7 @@ def score_members(file: ScoreFile, chosen: RefinedSet, jobs: int = 2) -> Refined
     """
     refined = refined_table(file, chosen.table)
     at = chosen.row, list(chosen.order)
-    arm = refined.origin[at].astype(np.int64) // file.configurations.arm_size
     scorer = PointScorer.of(file, chosen.table, jobs)
-    scores = scorer.score_table(Points(refined.values[at], arm), refined.weights)
+    scores = scorer.score_table(refined.values[at], refined.weights)
     members = refined.members(file.configurations, chosen.row)
     return RefinedMembers(tuple(members[i] for i in chosen.order), scores)

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.placement.refinement.points import PointScores
-from tcs.placement.tables import Points
 
 TIE = 1e-3
 """Weight of P_R + P_M beside the success: decides among sets of equal success, and is less than
@@ -33,7 +32,7 @@ class ScoreObjective:
     weights: FloatArray
     """Weights of the goals, sum 1, shape (G,)."""
 
-    def features(self, points: Points, scores: PointScores) -> Features:
+    def features(self, points: FloatArray, scores: PointScores) -> Features:
         """Return the goals that configurations reach, and their dexterity there."""
         return Features(scores.reached, scores.dexterity)
 
@@ -60,5 +59,5 @@ class Samples(Protocol):
     def only(self, rows: NDArray[np.intp]) -> Self:
         """Return some of the samples."""
 
-    def reached(self, points: Points) -> BoolArray:
+    def reached(self, points: FloatArray) -> BoolArray:
         """Return which goals each configuration reaches in each sample, shape (n, samples, G)."""

@@ -121,7 +121,7 @@ def place(
         serving[rows] = len(found)
         values[rows] = base.dexterity[served]
         joints[rows] = base.joints[served] if path is None else path
-        found.append(stop.grid.between(base.values.tolist(), 0))
+        found.append(stop.grid.between(base.values.tolist()))
         continuous.append(path is not None)
     reached = serving >= 0
     for array in (serving, values, joints, reached):

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
-from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
+from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.rows import Rows
 from tcs.kernel.scores import Scores, new_scores
@@ -19,12 +21,14 @@ from tcs.model.grid import ROBOT_AXES, Grid
 from tcs.model.scene import LoweredScene, Scene, environment_at, torso_at
 from tcs.placement.constraints import Footprint
 from tcs.placement.scoring.approaches import ApproachScorer, approach_lines
+from tcs.placement.scoring.hands import HandScores, best_of_hands
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.kernel_start import warm_up
-from tcs.placement.scoring.rebuild import rebuild_scene
+from tcs.placement.scoring.rebuild import rebuild_scenes
 from tcs.placement.scoring.sweep import name_contacts
-from tcs.placement.store import APPROACH, ScoreFile, files_of_arms
-from tcs.placement.tables import Points, Reason, ScoreTable
+from tcs.placement.scoring.together import Hands, together_at
+from tcs.placement.store import APPROACH, ScoreFile
+from tcs.placement.tables import Reason, ScoreTable
 
 if TYPE_CHECKING:
     from tcs.kernel.approach.sweep import ApproachLines
@@ -42,15 +46,19 @@ class PointScores(NamedTuple):
     """Its dexterity there, 0 where not reached, shape (n, G)."""
     joints: NDArray[np.float32]
     """Arm joints of the best solution [rad], 0 where not reached, shape (n, G, 7)."""
+    hand: NDArray[np.uint8]
+    """Number of the hand that serves each goal, shape (n, G)."""
 
 
 @dataclass(frozen=True, eq=False)
-class ScoredArm:
-    """The robot with one of its arms."""
+class ScoredHand:
+    """The robot with one hand."""
 
     job: Job
     scene: Scene
     lowered: LoweredScene
+    goals: tuple[int, ...]
+    """Numbers of the goals that the hand may serve."""
     lines: ApproachLines | None
     """The approaches of the goals; None to score all postures."""
 
@@ -64,8 +72,8 @@ class PointScorer:
     Construction builds Drake's plant, which takes half a second.
     """
 
-    arms: tuple[ScoredArm, ...]
-    """The robot with each arm, in the order of the grid."""
+    hands: tuple[ScoredHand, ...]
+    """The robot with each hand."""
     grid: Grid
     """The grid of the file."""
     measure: str
@@ -85,13 +93,13 @@ class PointScorer:
             StoreMismatchError: If the file was made from other models.
             RobotError: If the file was scored with approach, and a velocity limit is unknown.
         """
-        arms = []
-        for of_arm in files_of_arms(file):
-            job, scene, lowered = rebuild_scene(of_arm)
-            lines = approach_lines(job) if APPROACH in file.metadata else None
-            arms.append(ScoredArm(job, scene, lowered, lines))
+        with_approach = APPROACH in file.metadata
+        hands = tuple(
+            ScoredHand(*built, goals, approach_lines(built[0]) if with_approach else None)
+            for built, goals in zip(rebuild_scenes(file), file.goals_of_hands, strict=True)
+        )
         return cls(
-            tuple(arms),
+            hands,
             file.configurations,
             str(file.metadata["measure"]),
             file.observed_states[table],
@@ -105,42 +113,54 @@ class PointScorer:
         Args:
             on_compile: Called first if the kernel has to be compiled.
         """
-        for arm in self.arms:
-            problem = build_problem(arm.lowered.arrays, self.measure)
-            scorer = None if arm.lines is None else ApproachScorer(problem, arm.lines)
+        for hand in self.hands:
+            problem = build_problem(hand.lowered.arrays, self.measure)
+            scorer = None if hand.lines is None else ApproachScorer(problem, hand.lines)
             warm_up(problem, on_compile, scorer)
 
     @property
     def built(self) -> list[tuple[Job, Scene, LoweredScene]]:
-        """The robot with each arm, for trials."""
-        return [(arm.job, arm.scene, arm.lowered) for arm in self.arms]
+        """The robot with each hand, for trials."""
+        return [(hand.job, hand.scene, hand.lowered) for hand in self.hands]
 
     @property
     def goals(self) -> int:
         """Number of goals."""
-        return len(self.arms[0].job.task.goals)
+        return len({goal for hand in self.hands for goal in hand.goals})
 
-    def score(self, points: Points) -> PointScores:
-        """Return the scores of configurations; one on a forbidden region reaches nothing."""
-        found = self._scores(points)
-        return PointScores(found.reason == Reason.REACHED, found.dexterity, found.joints)
+    def score(self, points: FloatArray) -> PointScores:
+        """Return the scores of configurations; one on a forbidden region reaches nothing.
 
-    def score_table(self, points: Points, weights: FloatArray) -> ScoreTable:
+        Args:
+            points: Values in the order of the axes [m or rad], shape (n, axes).
+        """
+        found, hand = self._scores(points)
+        return PointScores(found.reason == Reason.REACHED, found.dexterity, found.joints, hand)
+
+    def of_hand(self, hand: int) -> Self:
+        """Return the scorer of the goals of one hand, numbered as those of the hand."""
+        alone = self.hands[hand]
+        goals = tuple(range(len(alone.goals)))
+        return dataclasses.replace(self, hands=(dataclasses.replace(alone, goals=goals),))
+
+    def score_table(self, points: FloatArray, weights: FloatArray | None = None) -> ScoreTable:
         """Return the scores of configurations as a table, with reasons and bodies in contact.
 
         Args:
-            points: The configurations.
-            weights: Weights of the goals, sum 1, shape (G,).
+            points: Values in the order of the axes [m or rad], shape (n, axes).
+            weights: Weights of the goals, sum 1, shape (G,); None for equal ones.
         """
-        found = self._scores(points)
+        if weights is None:
+            weights = np.full(self.goals, 1.0 / self.goals)
+        found, hand = self._scores(points)
         names: list[tuple[str, str]] = []
-        for number, arm in enumerate(self.arms):
-            rows = points.arm == number
-            pair = found.contact[rows]
-            problem = build_problem(arm.lowered.arrays, self.measure)
-            of_arm = name_contacts(pair, arm.lowered, problem)
-            found.contact[rows] = np.where(pair >= 0, pair + len(names), -1)
-            names.extend(of_arm)
+        for number, of_hand in enumerate(self.hands):
+            at = hand == number
+            problem = build_problem(of_hand.lowered.arrays, self.measure)
+            pair = found.contact[at]
+            of_pairs = name_contacts(pair, of_hand.lowered, problem)
+            found.contact[at] = np.where(pair >= 0, pair + len(names), -1)
+            names.extend(of_pairs)
         reached = found.reason == Reason.REACHED
         return ScoreTable(
             dexterity=found.dexterity,
@@ -149,31 +169,44 @@ class PointScorer:
             pair_names=tuple(names),
             arm_joints=found.joints[reached],
             weights=weights,
+            hand=hand if len(self.hands) > 1 else None,
         )
 
-    def _scores(self, points: Points) -> Scores:
+    def _scores(self, points: FloatArray) -> HandScores:
         """Return the scores of configurations as the kernel gives them, 0 where not reached."""
-        count = len(points.values)
-        found = Scores(
-            reason=np.full((count, self.goals), Reason.EXCLUDED, np.uint8),
-            contact=np.full((count, self.goals), -1, np.int32),
-            dexterity=np.zeros((count, self.goals), np.float32),
-            joints=np.zeros((count, self.goals, 7), np.float32),
-        )
-        admitted = ~self._forbidden(points)
-        for number, arm in enumerate(self.arms):
-            rows = np.flatnonzero(admitted & (points.arm == number))
-            if rows.size:
-                self._score_arm(arm, points.values, rows, found)
-        reached = found.reason == Reason.REACHED
-        found.dexterity[~reached], found.joints[~reached] = 0.0, 0.0
-        return found
+        scores = new_scores(len(points), self.goals)
+        scores.reason[:], scores.contact[:] = Reason.EXCLUDED, -1
+        hand = np.zeros(scores.reason.shape, np.uint8)
+        rows = np.flatnonzero(~self._forbidden(points))
+        if rows.size:
+            chosen = points[rows]
+            states, state = np.unique(chosen[:, : -len(ROBOT_AXES)], axis=0, return_inverse=True)
+            levels, level = np.unique(self._columns(chosen, "torso")[:, 0], return_inverse=True)
+            x, y, yaw = self._columns(chosen, "base_x", "base_y", "base_yaw").T
+            at = Rows(state.ravel(), x, y, yaw, level.ravel())
+            problems = tuple(self._problem(one, states, levels) for one in self.hands)
+            parts = [
+                self._scores_of(one, problem, at)
+                for one, problem in zip(self.hands, problems, strict=True)
+            ]
+            together_at(parts, dataclasses.replace(self._together, problems=problems), at)
+            some = best_of_hands(parts, [one.goals for one in self.hands])
+            scores.put(rows, some.scores)
+            hand[rows] = some.hand
+        reached = scores.reason == Reason.REACHED
+        scores.dexterity[~reached], scores.joints[~reached] = 0.0, 0.0
+        return HandScores(scores, hand)
 
-    def _forbidden(self, points: Points) -> BoolArray:
+    @cached_property
+    def _together(self) -> Hands:
+        """The hands, to check arms that work at the same time against each other."""
+        return Hands.of([(hand.job, hand.lowered) for hand in self.hands], self.measure)
+
+    def _forbidden(self, points: FloatArray) -> BoolArray:
         """Return which configurations stand on a forbidden region, shape (n,)."""
-        base = self._columns(points.values, "base_x", "base_y", "base_yaw")
+        base = self._columns(points, "base_x", "base_y", "base_yaw")
         forbidden = np.zeros(len(base), dtype=np.bool_)
-        for region in self.arms[0].job.constraints.forbid:
+        for region in self.hands[0].job.constraints.forbid:
             forbidden |= self.footprint.overlaps(region, base)
         return forbidden
 
@@ -182,38 +215,33 @@ class PointScorer:
         order = list(ROBOT_AXES)
         return values[:, [order.index(name) - len(order) for name in names]]
 
-    def _score_arm(self, arm: ScoredArm, values: FloatArray, rows: IntArray, found: Scores) -> None:
-        """Fill the scores of some configurations, all with one arm."""
-        chosen = values[rows]
-        states, state = np.unique(chosen[:, : -len(ROBOT_AXES)], axis=0, return_inverse=True)
-        levels, level = np.unique(self._columns(chosen, "torso")[:, 0], return_inverse=True)
-        problem = self._problem(arm, states, levels)
+    def _scores_of(self, hand: ScoredHand, problem: Problem, at: Rows) -> Scores:
+        """Return the scores of configurations with one hand."""
         grippers = gripper_contacts(problem)
-        approaches = None if arm.lines is None else ApproachScorer(problem, arm.lines)
-        x, y, yaw = self._columns(chosen, "base_x", "base_y", "base_yaw").T
-        at = Rows(state.ravel(), x, y, yaw, level.ravel())
+        approaches = None if hand.lines is None else ApproachScorer(problem, hand.lines)
+        found = new_scores(len(at.state), problem.goal_p.shape[1])
 
         def score_batch(start: int) -> None:
             part = slice(start, start + BATCH)
-            scores = new_scores(rows[part].size, self.goals)
+            scores = found.part(part)
             score_rows(problem, grippers, at.at(part), scores)
             if approaches is not None:
                 approaches.score_rows(problem, at.at(part), scores)
-            found.put(rows[part], scores)
 
         Parallel(n_jobs=self.jobs, prefer="threads")(
-            delayed(score_batch)(start) for start in range(0, rows.size, BATCH)
+            delayed(score_batch)(start) for start in range(0, len(at.state), BATCH)
         )
+        return found
 
-    def _problem(self, arm: ScoredArm, states: FloatArray, levels: FloatArray) -> Problem:
+    def _problem(self, hand: ScoredHand, states: FloatArray, levels: FloatArray) -> Problem:
         """Return the kernel's problem of environment states and torso heights."""
         names = [axis.name for axis in self.grid.environment_axes]
         positions = (
             {**self.observed, **dict(zip(names, map(float, state), strict=True))}
             for state in states
         )
-        moved = environment_at(arm.lowered, arm.scene, arm.job.task, positions)
-        raised = torso_at(arm.lowered, arm.scene, levels)
+        moved = environment_at(hand.lowered, hand.scene, hand.job.task, positions)
+        raised = torso_at(hand.lowered, hand.scene, levels)
         arrays = moved._replace(
             arm_base_R=raised.arm_base_R, arm_base_p=raised.arm_base_p, body=raised.body
         )

@@ -21,7 +21,7 @@ from tcs.placement.constraints import Obstacle
 from tcs.placement.refinement.points import PointScores
 from tcs.placement.scoring.kernel_start import warm_up
 from tcs.placement.scoring.obstacles import with_obstacles
-from tcs.placement.tables import Points, Reason
+from tcs.placement.tables import Reason
 
 BATCH = 64
 """Most base poses that a thread scores at a time."""
@@ -60,10 +60,10 @@ class PoseScorer:
         grippers = np.ascontiguousarray(self.grippers[:, chosen])
         return type(self)(problem, grippers, self.grid, self.jobs)
 
-    def score(self, points: Points) -> PointScores:
+    def score(self, points: FloatArray) -> PointScores:
         """Return the scores of base poses."""
-        count, goals = len(points.values), self.problem.goal_p.shape[1]
-        x, y, yaw = points.values[:, :3].T
+        count, goals = len(points), self.problem.goal_p.shape[1]
+        x, y, yaw = points[:, :3].T
         one = np.zeros(count, np.int64)
         rows, found = Rows(one, x, y, yaw, one), new_scores(count, goals)
 
@@ -76,7 +76,8 @@ class PoseScorer:
         )
         reached = found.reason == Reason.REACHED
         found.dexterity[~reached], found.joints[~reached] = 0.0, 0.0
-        return PointScores(reached, found.dexterity, found.joints)
+        hand = np.zeros(reached.shape, np.uint8)
+        return PointScores(reached, found.dexterity, found.joints, hand)
 
 
 @dataclass(frozen=True, eq=False)

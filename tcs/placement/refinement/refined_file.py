@@ -11,7 +11,7 @@ from importlib.metadata import version
 import numpy as np
 
 from tcs.errors import SelectionError, TcsError, UnknownNameError
-from tcs.kernel.arrays import BoolArray
+from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.model.random_streams import check_draws, named_generator
 from tcs.placement.refinement.displaced import DisplacedBases
 from tcs.placement.refinement.floor import (
@@ -34,7 +34,7 @@ from tcs.placement.robustness.body_collisions import check_body_collisions
 from tcs.placement.selection import Top, UtilityWeights, select
 from tcs.placement.selection.choice import SelectionTables
 from tcs.placement.store import ScoreFile
-from tcs.placement.tables import Points, SetTable, tc_reachability
+from tcs.placement.tables import SetTable, tc_reachability
 
 OBJECTIVES = ("score", "success")
 """What a refinement maximises: P_R + P_M, or the success under the errors of the environment."""
@@ -169,10 +169,11 @@ def refine(
     elif by_success:
         choosing = RememberedSamples(draw(judges, CHOICE_STREAM))
         walks = at_surest(walks, choosing, sets.weights)
-        needed = partial(_as_sure_as, walks[0].present.points, choosing, sets)
+        needed = partial(_as_sure_as, walks[0].present.values, choosing, sets)
     first = without_idle_members(walks[0], search.objective, needed)
     walks = [first, *walks[1:]]
-    refined = with_estimates(file, number, scorer, as_table(walks, sets.weights))
+    made = as_table(walks, sets.weights, has_hands=bool(file.hands))
+    refined = with_estimates(file, number, scorer, made)
     success = _success(search, walks[0], fresh, sets) if keep or by_success else None
     settings = {
         "program_version": version("tcs"),
@@ -244,7 +245,7 @@ def _floor(search: LocalSearch, samples: Samples, sets: SetTable) -> SuccessFloo
 
 
 def _as_sure_as(
-    least: Points, samples: Samples, sets: SetTable, others: Sequence[Points]
+    least: FloatArray, samples: Samples, sets: SetTable, others: Sequence[FloatArray]
 ) -> BoolArray:
     """Return which sets have at least the success of one set in some samples, shape (n,)."""
     first, *found = successes(samples, sets.weights, [least, *others])
@@ -256,8 +257,7 @@ def _success(
 ) -> dict[str, float | int]:
     """Return the success of the best set of the grid and of a refined set in fresh samples."""
     of_sets = []
-    refined = Points(walk.present.values, walk.present.arm)
-    for points in (search.points_of(sets.best), refined):
+    for points in (search.points_of(sets.best), walk.present.values):
         reached = np.logical_or.reduce(fresh.reached(points), axis=0)
         of_sets.append(float(tc_reachability(reached, sets.weights).mean()))
     return {"before": of_sets[0], "after": of_sets[1], "samples": fresh.samples}

@@ -9,12 +9,11 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.kernel.arrays import BoolArray
+from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.model.grid import Grid
 from tcs.placement.refinement.objectives import Features, ScoreObjective
 from tcs.placement.refinement.points import PointScores
 from tcs.placement.refinement.space import Space
-from tcs.placement.tables import Points
 
 POINTS_PER_AXIS = 8
 """Random configurations per axis around each member in a round."""
@@ -38,11 +37,12 @@ class Evaluated(NamedTuple):
     """Configurations with their scores and what they contribute to the objective, by rows."""
 
     values: NDArray[Any]
-    """As of `Points`; so are the other arrays of `Points`, `PointScores` and `Features`."""
-    arm: NDArray[Any]
+    """Values in the order of the axes [m or rad], shape (n, axes); the other arrays are those of
+    `PointScores` and `Features`."""
     reached: NDArray[Any]
     dexterity: NDArray[Any]
     joints: NDArray[Any]
+    hand: NDArray[Any]
     feature_reached: NDArray[Any]
     feature_dexterity: NDArray[Any]
 
@@ -59,11 +59,6 @@ class Evaluated(NamedTuple):
     def features(self) -> Features:
         """What the configurations contribute to the objective."""
         return Features(self.feature_reached, self.feature_dexterity)
-
-    @property
-    def points(self) -> Points:
-        """The configurations alone."""
-        return Points(self.values, self.arm)
 
 
 @dataclass(eq=False)
@@ -102,7 +97,7 @@ class Walk:
         return len(self.origin)
 
 
-SetCondition = Callable[[Sequence[Points]], BoolArray]
+SetCondition = Callable[[Sequence[FloatArray]], BoolArray]
 """Returns which of several sets satisfy a condition."""
 
 
@@ -113,7 +108,7 @@ class Scorer(Protocol):
     def grid(self) -> Grid:
         """The grid that the search starts from."""
 
-    def score(self, points: Points) -> PointScores:
+    def score(self, points: FloatArray) -> PointScores:
         """Return the scores of configurations."""
 
 
@@ -155,18 +150,16 @@ class LocalSearch:
             on_round(number + 1, rounds)
         return sorted(walks, key=lambda walk: -walk.value), scored
 
-    def points_of(self, flat: Sequence[int]) -> Points:
-        """Return configurations of the grid, given by flat indices."""
-        grid, indices = self.scorer.grid, np.array(flat, dtype=np.int64)
-        at = grid.values(indices)
-        return Points(
-            np.stack([at[axis.name] for axis in grid.axes], axis=1), indices // grid.arm_size
-        )
+    def points_of(self, flat: Sequence[int]) -> FloatArray:
+        """Return the values of configurations of the grid, given by flat indices."""
+        grid = self.scorer.grid
+        at = grid.values(np.array(flat, dtype=np.int64))
+        return np.stack([at[axis.name] for axis in grid.axes], axis=1)
 
-    def _evaluated(self, points: Points) -> Evaluated:
+    def _evaluated(self, points: FloatArray) -> Evaluated:
         """Return configurations with their scores and features."""
         scores = self.scorer.score(points)
-        return Evaluated(*points, *scores, *self.objective.features(points, scores))
+        return Evaluated(points, *scores, *self.objective.features(points, scores))
 
     def _started(self, starts: Sequence[tuple[int, ...]]) -> list[Walk]:
         """Return walks that stand on the grid."""
@@ -187,15 +180,10 @@ class LocalSearch:
             The number of scored configurations.
         """
         proposed = [part for walk in walks for part in self._around(walk)]
-        found = self._evaluated(
-            Points(
-                np.concatenate([part.values for part in proposed]),
-                np.concatenate([part.arm for part in proposed]),
-            )
-        )
-        ends = np.cumsum([len(part.values) for part in proposed])
+        found = self._evaluated(np.concatenate(proposed))
+        ends = np.cumsum([len(part) for part in proposed])
         parts = [
-            found.rows(slice(end - len(part.values), end))
+            found.rows(slice(end - len(part), end))
             for part, end in zip(proposed, ends, strict=True)
         ]
         offered = []
@@ -205,7 +193,7 @@ class LocalSearch:
         self._move(walks, offered)
         return int(ends[-1])
 
-    def _around(self, walk: Walk) -> list[Points]:
+    def _around(self, walk: Walk) -> list[FloatArray]:
         """Return configurations around each member of a set: random ones, and along each axis."""
         axes = self.space.cell.size
         reach = walk.width * self.space.cell
@@ -216,11 +204,10 @@ class LocalSearch:
         levels[0] = 0.0
         along = np.concatenate([np.eye(axes), -np.eye(axes)])[np.tile(reach > 0.0, 2)]
         found = []
-        for values, arm in zip(walk.present.values, walk.present.arm, strict=True):
+        for values in walk.present.values:
             drawn = self.rng.uniform(-1.0, 1.0, (count, axes))
             drawn[:, slow] = levels[np.arange(count) % LEVELS]
-            around = self.space.inside(values + np.concatenate([drawn, along]) * reach)
-            found.append(Points(around, np.full(len(around), arm)))
+            found.append(self.space.inside(values + np.concatenate([drawn, along]) * reach))
         return found
 
     def _move(
@@ -241,7 +228,7 @@ class LocalSearch:
             keeps = (
                 np.ones(len(sets), dtype=np.bool_)
                 if self.keeps is None
-                else self.keeps([members.points for members, _ in sets])
+                else self.keeps([members.values for members, _ in sets])
             )
             for k, (members, value), kept in zip(tried, sets, keeps, strict=True):
                 if kept:
@@ -311,7 +298,7 @@ def without_idle_members(
         present = walk.present.rows(np.array(others))
         reached, dexterity = present.features
         value = float(objective.values(Features(reached[None], dexterity[None]))[0])
-        if value < walk.value - GAIN or not (keeps is None or keeps([present.points])[0]):
+        if value < walk.value - GAIN or not (keeps is None or keeps([present.values])[0]):
             continue
         fewer = Walk(tuple(walk.origin[k] for k in others), present, value, walk.width)
         return without_idle_members(fewer, objective, keeps)

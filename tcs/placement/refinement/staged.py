@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
 from tcs.placement.refinement.floor import RememberedSamples
 from tcs.placement.refinement.objectives import Samples
-from tcs.placement.tables import Points
 
 ENDS = (32, 128, 512)
 """Samples after each stage but the last, which has all."""
@@ -46,7 +45,7 @@ class StagedSamples:
         """Number of stages."""
         return len(self.parts)
 
-    def features(self, points: Points, stage: int) -> NDArray[np.float32]:
+    def features(self, points: FloatArray, stage: int) -> NDArray[np.float32]:
         """Return what configurations reach up to a stage, one number for each sample and goal.
 
         Returns:
@@ -58,7 +57,7 @@ class StagedSamples:
         root = np.sqrt(self.weights / reached.shape[1]).astype(np.float32)
         return np.asarray((reached * root).reshape(len(reached), -1))
 
-    def successes(self, sets: Sequence[Points], stage: int) -> FloatArray:
+    def successes(self, sets: Sequence[FloatArray], stage: int) -> FloatArray:
         """Return the mean of P_R of sets up to a stage, shape (n,)."""
         found = []
         for points in sets:

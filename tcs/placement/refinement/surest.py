@@ -147,7 +147,7 @@ class SurestSearch(LocalSearch):
     def _valued(self, sets: Sequence[Evaluated]) -> FloatArray:
         """Return the success of sets in all samples, with P_R + P_M among equals, shape (n,)."""
         assert self.staged is not None
-        success = self.staged.successes([one.points for one in sets], self.staged.stages - 1)
+        success = self.staged.successes([one.values for one in sets], self.staged.stages - 1)
         scores = [
             self.objective.values(Features(one.reached[None], one.dexterity[None]))[0]
             for one in sets
@@ -174,7 +174,7 @@ class SurestSearch(LocalSearch):
         """End a walk that loses nothing: a greater P_R + P_M would lead it to an edge."""
         assert self.staged is not None
         last = self.staged.stages - 1
-        if self.staged.successes([walk.present.points], last)[0] > 1.0 - GAIN:
+        if self.staged.successes([walk.present.values], last)[0] > 1.0 - GAIN:
             walk.width = 0.0
 
     def _better(self, walk: Walk, around: Sequence[Evaluated]) -> list[tuple[Evaluated, float]]:
@@ -186,7 +186,7 @@ class SurestSearch(LocalSearch):
             choices.append(Evaluated.joined([walk.present.rows(slice(i, i + 1)), some]))
         sets = self._screened(choices)
         for stage, remaining in zip(range(1, self.staged.stages), SETS[1:], strict=False):
-            found = self.staged.successes([one.points for one in sets], stage)
+            found = self.staged.successes([one.values for one in sets], stage)
             sets = [sets[k] for k in np.argsort(-found, kind="stable")[:remaining]]
         if not sets:
             return []
@@ -201,7 +201,7 @@ class SurestSearch(LocalSearch):
         Any two members change together, the others of a set of three stay.
         """
         assert self.staged is not None
-        features = [self.staged.features(part.points, 0) for part in choices]
+        features = [self.staged.features(part.values, 0) for part in choices]
         preferences = [
             PREFERENCE
             * self.objective.values(Features(part.reached[:, None], part.dexterity[:, None]))

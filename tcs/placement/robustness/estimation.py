@@ -21,7 +21,6 @@ from tcs.placement.robustness.successive_halving import Estimates, round_sizes, 
 from tcs.placement.robustness.trials import Errors, Progress, Trials
 from tcs.placement.store import ScoreFile, state_to_json
 from tcs.placement.tables import (
-    Points,
     RefinedSuccess,
     RefinedTable,
     SetTable,
@@ -231,9 +230,7 @@ def with_success(
     """
     offsets = trials.errors.draw(samples, seed, stream=ESTIMATION_STREAM)
     rows, columns = np.nonzero(refined.origin != NO_MEMBER)
-    arm = refined.origin[rows, columns].astype(np.int64) // trials.grid.arm_size
-    points = Points(refined.values[rows, columns], arm)
-    found = PerturbedPoints(trials, offsets, jobs).reached(points)
+    found = PerturbedPoints(trials, offsets, jobs).reached(refined.values[rows, columns])
     fractions = [
         tc_reachability(np.logical_or.reduce(found[rows == row]), refined.weights)
         for row in range(len(refined.origin))

@@ -229,7 +229,7 @@ def evaluate(
         about={
             "task": trials.job.task.name,
             "environment": trials.job.spec.environment.name,
-            "robot": trials.job.spec.robot.name,
+            "robot": trials.file.robot["name"],
         },
         members=()
         if is_drawn

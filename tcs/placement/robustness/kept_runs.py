@@ -27,17 +27,17 @@ PROBES = 8
 
 
 def trials_key(
-    arms: Iterable[tuple[LoweredScene, BoolArray, ApproachLines | None]], measure: str
+    hands: Iterable[tuple[LoweredScene, BoolArray, ApproachLines | None]], measure: str
 ) -> str:
     """Return the hash of what all trials follow from: program, scene and what counts in it.
 
     Args:
-        arms: The scene of each arm as arrays, the pairs of shapes whose collisions count, and the
+        hands: The scene of each hand as arrays, the pairs of shapes whose collisions count, and the
             approaches of the goals if they are scored.
         measure: Name of the dexterity measure.
     """
     sha = hashlib.sha256(f"trials\0{program_digest()}\0{measure}\0".encode())
-    for lowered, pairs, lines in arms:
+    for lowered, pairs, lines in hands:
         sha.update(lowered.digest().encode() + np.packbits(pairs).tobytes())
         for values in () if lines is None else lines:
             sha.update(np.asarray(values, dtype="<f8").tobytes())
@@ -45,9 +45,7 @@ def trials_key(
 
 
 def states_digest(
-    arm: int,
-    positions: Mapping[str, FloatArray],
-    probe: Callable[[Mapping[str, FloatArray]], str],
+    positions: Mapping[str, FloatArray], probe: Callable[[Mapping[str, FloatArray]], str]
 ) -> str:
     """Return the hash of an environment in several states.
 
@@ -55,11 +53,10 @@ def states_digest(
     therefore hashed as the kernel sees them.
 
     Args:
-        arm: Number of the arm.
         positions: Position of each joint [m or rad], shapes (states,).
         probe: Returns the hash of the arrays of some states, given by their positions.
     """
-    sha = hashlib.sha256(f"{arm}\0".encode())
+    sha = hashlib.sha256()
     for name, values in sorted(positions.items()):
         sha.update(f"{name}\0".encode() + np.asarray(values, dtype="<f8").tobytes())
     count = min(len(values) for values in positions.values())

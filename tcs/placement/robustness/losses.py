@@ -80,21 +80,27 @@ def losses(trials: Trials, evaluation: Evaluation) -> Losses:
         return Losses((), 1.0)
     offsets = evaluation.offsets
     outcomes = [trials.outcome(int(h), offsets) for h in evaluation.sets[0]]
-    reached = np.array([found.reason == Reason.REACHED for found in outcomes])
+    reached = np.array([found.scores.reason == Reason.REACHED for found in outcomes])
     # A gripper blocked by the robot may be free from another base pose.
     blocked = Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT
-    unavoidable = np.all([found.reason == blocked for found in outcomes], axis=0)
+    unavoidable = np.all([found.scores.reason == blocked for found in outcomes], axis=0)
     found = []
     for goal in np.flatnonzero(lost.any(axis=0)).tolist():
         rows = lost[:, goal]
         member = int(reached[:, :, goal].sum(axis=1).argmax())
-        reasons = Counter(outcomes[member].reason[rows, goal].tolist())
-        contacts = Counter(outcomes[member].contact[rows, goal].tolist())
-        del contacts[-1]
-        lowered = trials.arm_of(int(evaluation.sets[0][member])).lowered
+        scores, hand = outcomes[member]
+        reasons = Counter(scores.reason[rows, goal].tolist())
+        contacts = Counter(
+            (number, code)
+            for number, code in zip(
+                hand[rows, goal].tolist(), scores.contact[rows, goal].tolist(), strict=True
+            )
+            if code >= 0
+        )
+        (of_hand, pair), times = contacts.most_common(1)[0] if contacts else ((0, -1), 0)
+        lowered = trials.hands[of_hand].lowered
         robot = lowered.robot_bodies
         others = (*lowered.environment_bodies, *robot)
-        pair, times = contacts.most_common(1)[0] if contacts else (-1, 0)
         errors = {
             name: float(values[rows].mean() / values.std())
             for name, values in offsets.items()
@@ -104,7 +110,7 @@ def losses(trials: Trials, evaluation: Evaluation) -> Losses:
         found.append(
             Loss(
                 goal=goal,
-                body_frame=trials.job.task.goals[goal].body_frame,
+                body_frame=trials.task.goals[goal].body_frame,
                 success=float(1.0 - rows.mean()),
                 member=member,
                 reasons={Reason(r): n / int(rows.sum()) for r, n in reasons.most_common()},

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import dataclasses
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,8 @@ from tcs.kernel.rows import Rows
 from tcs.kernel.scores import Scores, new_scores
 from tcs.kernel.sweep import score_rows
 from tcs.placement.scoring.approaches import ApproachScorer
+from tcs.placement.scoring.hands import HandScores, best_of_hands
+from tcs.placement.scoring.together import Hands, together_at
 from tcs.placement.tables import Reason
 
 BATCH = 500
@@ -32,36 +35,61 @@ class Run(NamedTuple):
     stop: int
 
 
-class PerturbedScenes(NamedTuple):
-    """One state of the environment in several samples, as kernel arrays."""
+class HandScenes(NamedTuple):
+    """One state of the environment in several samples, as kernel arrays, for one hand."""
 
     problem: Problem
     """Each sample is a state of the environment."""
     grippers: IntArray
     """Contacts between gripper and environment at each goal."""
+    goals: Sequence[int]
+    """Numbers of the goals that the hand may serve."""
     approaches: ApproachScorer | None = None
     """Scores the approaches of the goals; None to score all postures."""
 
-    def scores(self, poses: Rows, run: Run) -> Scores:
-        """Return the scores of one run, computed by the code that scores a grid."""
-        samples = np.arange(run.start, run.stop)
-        rows = poses.at(np.full(samples.size, run.row))._replace(state=samples)
-        scores = new_scores(samples.size, self.problem.goal_p.shape[1])
+    def scores(self, rows: Rows) -> Scores:
+        """Return the scores of rows, computed by the code that scores a grid."""
+        scores = new_scores(len(rows.state), self.problem.goal_p.shape[1])
         score_rows(self.problem, self.grippers, rows, scores)
         if self.approaches is not None:
             self.approaches.score_rows(self.problem, rows, scores)
         return scores
 
-    def reasons(self, poses: Rows, run: Run) -> NDArray[np.uint8]:
-        """Return the reason of each sample and goal of one run, shape (stop - start, goals).
+    @property
+    def for_reasons(self) -> HandScenes:
+        """The scenes for scores whose dexterity does not matter, which need not be the best.
 
-        They are those of `scores`, whose search goes on for the best solution. With approach it has
-        to: from another posture some approaches through narrow windows are not found.
+        With approach it has to be: from another posture some approaches through narrow windows are
+        not found.
         """
         if self.approaches is not None:
-            return self.scores(poses, run).reason
-        problem = self.problem._replace(measure=ANY_SOLUTION)
-        return self._replace(problem=problem).scores(poses, run).reason
+            return self
+        return self._replace(problem=self.problem._replace(measure=ANY_SOLUTION))
+
+
+class PerturbedScenes(NamedTuple):
+    """One state of the environment in several samples, for each hand."""
+
+    hands: tuple[HandScenes, ...]
+    together: Hands | None = None
+    """The hands, to check arms that work at the same time against each other."""
+
+    def scores(self, poses: Rows, run: Run) -> HandScores:
+        """Return the scores of one run, each goal by the best hand."""
+        samples = np.arange(run.start, run.stop)
+        rows = poses.at(np.full(samples.size, run.row))._replace(state=samples)
+        parts = [hand.scores(rows) for hand in self.hands]
+        if self.together is not None and self.together.pairs:
+            problems = tuple(hand.problem for hand in self.hands)
+            together_at(parts, dataclasses.replace(self.together, problems=problems), rows)
+        return best_of_hands(parts, [hand.goals for hand in self.hands])
+
+    def reasons(self, poses: Rows, run: Run) -> NDArray[np.uint8]:
+        """Return the reason of each sample and goal of one run, shape (stop - start, goals)."""
+        if self.together is not None and self.together.pairs:
+            return self.scores(poses, run).scores.reason
+        scenes = PerturbedScenes(tuple(hand.for_reasons for hand in self.hands))
+        return scenes.scores(poses, run).scores.reason
 
     def reached(
         self, poses: Rows, runs: list[Run], jobs: int

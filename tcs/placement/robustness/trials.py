@@ -18,10 +18,10 @@ from tcs.files.blocks import BlockFolder, Blocks, opened_if
 from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import Rows
-from tcs.kernel.scores import Scores
 from tcs.kernel.sweep import gripper_contacts
 from tcs.model.grid import Grid
 from tcs.model.scene import ErrorDistribution, LoweredScene, Scene, environment_at
+from tcs.model.tasks import Task
 from tcs.placement.robustness.body_collisions import (
     check_body_collisions,
     counted_pairs,
@@ -30,12 +30,14 @@ from tcs.placement.robustness.body_collisions import (
 from tcs.placement.robustness.displacements import displaced, samples_of
 from tcs.placement.robustness.error_model import ErrorModel, Offsets
 from tcs.placement.robustness.kept_runs import kept_runs, states_digest, trials_key
-from tcs.placement.robustness.perturbed_scenes import BATCH, PerturbedScenes, Run
+from tcs.placement.robustness.perturbed_scenes import BATCH, HandScenes, PerturbedScenes, Run
 from tcs.placement.scoring.approaches import ApproachScorer, approach_lines
-from tcs.placement.scoring.job import Job
+from tcs.placement.scoring.hands import HandScores
+from tcs.placement.scoring.job import Job, whole_task
 from tcs.placement.scoring.kernel_start import KernelStart
-from tcs.placement.scoring.rebuild import rebuild_scene
-from tcs.placement.store import APPROACH, ScoreFile, StateTables, files_of_arms
+from tcs.placement.scoring.rebuild import rebuild_scenes
+from tcs.placement.scoring.together import Hands
+from tcs.placement.store import APPROACH, ScoreFile, StateTables
 from tcs.placement.tables import Reason
 
 if TYPE_CHECKING:
@@ -51,11 +53,11 @@ Progress = Callable[[int, int], None] | None
 
 
 @dataclass(frozen=True, eq=False)
-class ArmTrials:
-    """The robot with one of its arms, prepared for trials."""
+class HandTrials:
+    """The robot with one hand, prepared for trials."""
 
     job: Job
-    """The scored task, robot, environment and grid of the arm."""
+    """The task with the goals of the hand, robot, environment and grid."""
     scene: Scene
     """The live scene."""
     lowered: LoweredScene
@@ -63,23 +65,22 @@ class ArmTrials:
     body_pairs: BoolArray
     """The pairs of body and environment shapes whose collisions count, shape (n_body,
     n_environment)."""
+    goals: tuple[int, ...]
+    """Numbers of the goals that the hand may serve."""
     lines: ApproachLines | None = None
     """The approaches of the goals, if the file was scored with approach."""
 
-    def scenes(
-        self, positions: Mapping[str, FloatArray], lowered: LoweredScene, measure: str
-    ) -> PerturbedScenes:
+    def scenes(self, positions: Mapping[str, FloatArray], measure: str) -> HandScenes:
         """Return the environment with its joints at each sample's positions, as arrays.
 
         Args:
             positions: Joint positions [m or rad], shapes (samples,).
-            lowered: The scene with the torso heights.
             measure: Name of the dexterity measure.
         """
-        arrays = environment_at(lowered, self.scene, self.job.task, _states(positions))
+        arrays = environment_at(self.lowered, self.scene, self.job.task, _states(positions))
         arrays = arrays._replace(body_vs_environment=self.body_pairs)
         problem = build_problem(arrays, measure)
-        return PerturbedScenes(problem, gripper_contacts(problem), self.approaches)
+        return HandScenes(problem, gripper_contacts(problem), self.goals, self.approaches)
 
     @cached_property
     def approaches(self) -> ApproachScorer | None:
@@ -114,8 +115,8 @@ class Trials:
     """Error model of the environment."""
     body_collisions: str
     """Collisions of the robot's body that count, one of `BODY_COLLISIONS`."""
-    arms: tuple[ArmTrials, ...]
-    """The robot with each arm that configurations use, in the order of the grid."""
+    hands: tuple[HandTrials, ...]
+    """The robot with each hand."""
     start: KernelStart
     """The start of the kernel, which is put off until something has to be scored."""
     blocks: Blocks | None = None
@@ -147,7 +148,7 @@ class Trials:
             SelectionError: If there is no such table.
         """
         check_body_collisions(body_collisions)
-        built = [rebuild_scene(of_arm) for of_arm in files_of_arms(file)]
+        built = rebuild_scenes(file)
         chosen = file.nominal_index if table is None else table
         if not 0 <= chosen < len(file.tables):
             raise SelectionError(
@@ -158,7 +159,7 @@ class Trials:
         start = KernelStart(
             lambda: (build_problem(lowered.arrays, measure) for *_, lowered in built),
             on_compile,
-            trials.arms[0].approaches,
+            trials.hands[0].approaches,
         )
         return dataclasses.replace(trials, start=start)
 
@@ -171,27 +172,28 @@ class Trials:
         errors: Errors = None,
         body_collisions: str = "paper",
     ) -> Trials:
-        """Return the trials of a table whose scene is built, once for each arm, and kernel started.
+        """Return the trials of a table whose scene is built, once for each hand, kernel started.
 
         Args:
             file: A score file.
             table: Number of its table.
-            built: Job, scene and arrays of each arm.
+            built: Job, scene and arrays of each hand.
             errors: As for `of`.
             body_collisions: As for `of`.
         """
-        arms = tuple(
-            ArmTrials(
+        hands = tuple(
+            HandTrials(
                 job,
                 scene,
                 counted_rests(lowered, body_collisions),
                 counted_pairs(scene, lowered, body_collisions),
+                goals,
                 approach_lines(job) if APPROACH in file.metadata else None,
             )
-            for job, scene, lowered in built
+            for (job, scene, lowered), goals in zip(built, file.goals_of_hands, strict=True)
         )
         errors_of = ErrorModel.of(built[0][1], errors)
-        return cls(file, table, errors_of, body_collisions, arms, KernelStart(tuple))
+        return cls(file, table, errors_of, body_collisions, hands, KernelStart(tuple))
 
     def at_table(self, table: int) -> Trials:
         """Return the trials of another table of the same file."""
@@ -215,37 +217,43 @@ class Trials:
     @property
     def key(self) -> str:
         """Hash of what the trials of all tables follow from, but for the errors."""
-        arms = ((arm.lowered, arm.body_pairs, arm.lines) for arm in self.arms)
-        return trials_key(arms, self._measure)
+        hands = ((hand.lowered, hand.body_pairs, hand.lines) for hand in self.hands)
+        return trials_key(hands, self._measure)
 
     @property
     def with_approach(self) -> bool:
         """Whether a goal counts as reached only by postures that can be approached."""
-        return self.arms[0].lines is not None
+        return self.hands[0].lines is not None
 
     @property
     def scored(self) -> StateTables:
         """Scores and sets of the table."""
         return self.file.tables[self.table]
 
+    @cached_property
+    def together(self) -> Hands:
+        """The hands, to check arms that work at the same time against each other."""
+        return Hands.of([(hand.job, hand.lowered) for hand in self.hands], self._measure)
+
+    @cached_property
+    def task(self) -> Task:
+        """The scored task, with the goals of all hands."""
+        return whole_task([hand.job for hand in self.hands])
+
     @property
     def job(self) -> Job:
-        """The scored task, environment and grid, with the robot of the first arm."""
-        return self.arms[0].job
+        """The job of the first hand."""
+        return self.hands[0].job
 
     @property
     def scene(self) -> Scene:
-        """The live scene of the first arm."""
-        return self.arms[0].scene
+        """The live scene of the first hand."""
+        return self.hands[0].scene
 
     @cached_property
     def grid(self) -> Grid:
         """The grid of the configurations."""
         return Grid.from_dict(self.file.grid)
-
-    def arm_of(self, member: int) -> ArmTrials:
-        """Return the robot with the arm that a configuration, given by flat index, uses."""
-        return self.arms[member // self.grid.arm_size]
 
     @property
     def observed(self) -> Mapping[str, float]:
@@ -346,7 +354,7 @@ class Trials:
                     step(1)
         return out
 
-    def outcome(self, member: int, offsets: Offsets) -> Scores:
+    def outcome(self, member: int, offsets: Offsets) -> HandScores:
         """Return the kernel's scores of a configuration, given by flat index, in each sample.
 
         Raises:
@@ -365,7 +373,7 @@ class Trials:
             Reached goals, shape (samples, goals), and arm joints [rad], shape (samples, goals, 7);
             joints are 0 where a goal is not reached.
         """
-        found = self.outcome(member, offsets)
+        found, _ = self.outcome(member, offsets)
         return found.reason == Reason.REACHED, found.joints
 
     def clipped(self, members: NDArray[np.integer[Any]], offsets: Offsets) -> int:
@@ -404,11 +412,10 @@ class Trials:
         """Return the positions of the joints of a state without error, by name [m or rad].
 
         Args:
-            state: Number of arm and environment state, as in `Rows`.
+            state: Number of the environment's state, as in `Rows`.
         """
         axes = self.grid.environment_axes
-        of_arm = state % (self.grid.arm_size // self.grid.state_size)
-        along = np.unravel_index(of_arm, self.grid.environment_shape) if axes else ()
+        along = np.unravel_index(state, self.grid.environment_shape) if axes else ()
         chosen = {axis.name: float(axis.values[i]) for axis, i in zip(axes, along, strict=True)}
         return {**self.observed, **chosen}
 
@@ -418,22 +425,21 @@ class Trials:
         """Return joint positions in each sample, and whether a joint was held at its limit.
 
         Args:
-            state: Number of arm and environment state, as in `Rows`.
+            state: Number of the environment's state, as in `Rows`.
             offsets: Errors of the joints, shapes (samples,).
         """
-        arm = self.arms[0]
-        return displaced(arm.job, arm.scene, self.nominal(state), offsets)
+        return displaced(self.job, self.scene, self.nominal(state), offsets)
 
     @property
     def _measure(self) -> str:
         return str(self.file.metadata["measure"])
 
     def _scenes(self, state: int, offsets: Offsets) -> PerturbedScenes:
-        """Return one state of the environment, with its arm, in each sample, as arrays."""
+        """Return one state of the environment in each sample, as arrays."""
         self.start.ensure()
         positions, _ = self.positions(state, offsets)
-        arm = self.arm_of(state * self.grid.state_size)
-        return arm.scenes(positions, arm.lowered, self._measure)
+        scenes = tuple(hand.scenes(positions, self._measure) for hand in self.hands)
+        return PerturbedScenes(scenes, self.together)
 
     def _found(
         self, state: int, offsets: Offsets, poses: Rows, runs: list[Run], jobs: int
@@ -443,8 +449,9 @@ class Trials:
             yield from self._scenes(state, offsets).reached(poses, runs, jobs)
             return
         positions, _ = self.positions(state, offsets)
-        number = state * self.grid.state_size // self.grid.arm_size
-        states = states_digest(number, positions, self.arms[number].arrays_digest)
+        states = states_digest(
+            positions, lambda some: "".join(hand.arrays_digest(some) for hand in self.hands)
+        )
         yield from kept_runs(
             self.blocks, states, lambda: self._scenes(state, offsets), poses, runs, jobs
         )

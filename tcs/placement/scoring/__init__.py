@@ -8,12 +8,11 @@ from __future__ import annotations
 
 from tcs.files.blocks import BlockFolder
 from tcs.placement.scoring.catalogue import default_path, task_environment_pairs
-from tcs.placement.scoring.hands import whole_task
-from tcs.placement.scoring.job import Job, load_job
+from tcs.placement.scoring.job import Job, load_job, whole_task
 from tcs.placement.scoring.kernel_start import warm_up
 from tcs.placement.scoring.live import LiveScorer, score_observed
 from tcs.placement.scoring.offline import score
-from tcs.placement.scoring.rebuild import rebuild_scene, rebuild_scenes
+from tcs.placement.scoring.rebuild import rebuild_scenes
 from tcs.placement.scoring.score_summary import summary
 from tcs.placement.scoring.sets import SetOptions, build_sets
 from tcs.placement.scoring.sweep import Sweep, sweep
@@ -29,7 +28,6 @@ __all__ = [
     "build_sets",
     "default_path",
     "load_job",
-    "rebuild_scene",
     "rebuild_scenes",
     "score",
     "score_observed",

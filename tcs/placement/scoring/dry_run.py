@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +16,7 @@ from tcs.kernel.sweep import gripper_contacts
 from tcs.placement.scoring.approaches import ApproachScorer, approach_lines, choose_approach
 from tcs.placement.scoring.blocks import BLOCK, Block
 from tcs.placement.scoring.engines import SLICE, Part, Work
-from tcs.placement.scoring.job import Job
+from tcs.placement.scoring.job import Job, whole_task
 from tcs.placement.scoring.kernel_start import warm_up
 
 SAMPLES = 24
@@ -56,12 +56,17 @@ class Estimate:
 
 
 def estimate(
-    job: Job, *, measure: str, jobs: int, approach: bool | None = None, slices: int = SAMPLES
+    hands: Sequence[Job],
+    *,
+    measure: str,
+    jobs: int,
+    approach: bool | None = None,
+    slices: int = SAMPLES,
 ) -> Estimate:
-    """Estimate what scoring a job would take.
+    """Estimate what scoring the jobs of some hands into one file would take.
 
     Args:
-        job: The job.
+        hands: The job of each hand.
         measure: Name of the dexterity measure.
         jobs: Number of threads; the time is that of one thread divided by it.
         approach: As for `tcs.score`.
@@ -70,20 +75,30 @@ def estimate(
     Raises:
         ArmClassError: If `approach` is requested where it cannot be scored.
     """
-    scene = job.scene()
-    choice = choose_approach(approach, [(job, scene)])
-    lowered = job.lowered(scene)
-    problem = build_problem(lowered.arrays, measure)
-    scorer = ApproachScorer(problem, approach_lines(job)) if choice.is_scored else None
-    warm_up(problem, approaches=scorer)
-    work = Work(problem, lowered.grid, gripper_contacts(problem))
-    size = job.scored_grid.size
-    starts = np.unique(np.linspace(0, max(0, size - SLICE), slices).astype(int))
-    scored = [
-        scored_slice(work, Part(start, min(start + SLICE, size)), scorer)
-        for start in starts.tolist()
-    ]
-    return estimate_from(job, scored, jobs=jobs)
+    built = [(job, job.scene()) for job in hands]
+    choice = choose_approach(approach, built)
+    found = []
+    for job, scene in built:
+        lowered = job.lowered(scene)
+        problem = build_problem(lowered.arrays, measure)
+        scorer = ApproachScorer(problem, approach_lines(job)) if choice.is_scored else None
+        warm_up(problem, approaches=scorer)
+        work = Work(problem, lowered.grid, gripper_contacts(problem))
+        size = job.scored_grid.size
+        starts = np.unique(np.linspace(0, max(0, size - SLICE), slices).astype(int))
+        scored = [
+            scored_slice(work, Part(start, min(start + SLICE, size)), scorer)
+            for start in starts.tolist()
+        ]
+        found.append(estimate_from(job, scored, jobs=jobs))
+    sums = ("scoring_seconds", "memory_bytes", "scratch_bytes", "disk_bytes", "blocks")
+    return replace(
+        found[0],
+        robot=hands[0].given_robot.name,
+        goals=len(whole_task(hands).goals),
+        scoring_seconds_error=float(np.hypot.reduce([one.scoring_seconds_error for one in found])),
+        **{name: sum(getattr(one, name) for one in found) for name in sums},
+    )
 
 
 class ScoredSlice(NamedTuple):

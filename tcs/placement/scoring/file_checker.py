@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Self
@@ -16,7 +17,7 @@ from tcs.kernel.rows import rows_at
 from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scans
 from tcs.model.tasks import partners
 from tcs.placement.scoring.drake_check import DrakeChecker, Finding, of_both
-from tcs.placement.scoring.hands import whole_task
+from tcs.placement.scoring.job import whole_task
 from tcs.placement.scoring.kernel_start import ANALYTIC, NUMERIC, ik_of
 from tcs.placement.scoring.rebuild import rebuild_scenes
 from tcs.placement.scoring.strata import Pairs
@@ -33,12 +34,22 @@ of a full turn, and the number of postures that they should not exceed, as every
 class Posture(NamedTuple):
     """A posture at a goal, and that of the arm that works at the same time."""
 
+    hand: int
+    """Number of the hand."""
     value: float
     """Dexterity, of two arms the lesser; -1 if there is no posture."""
     q: NDArray[np.float64]
     """Joints [rad], shape (7,)."""
     other: NDArray[np.float64] | None
     """Joints of the other arm [rad], shape (7,); None for a goal by itself."""
+
+
+class _Scan(NamedTuple):
+    """A pair of configuration and goal that is scanned with a hand."""
+
+    h: int
+    g: int
+    hand: int
 
 
 class RefinedPair(NamedTuple):
@@ -60,14 +71,14 @@ class FileChecker:
     tables: tuple[StateTables, ...]
     size: int
     """Number of configurations per table."""
-    hand_of_goal: tuple[tuple[int, int], ...]
-    """The hand of each goal, and its number there; () if the file is not of several hands."""
+    goals: tuple[tuple[int, ...], ...]
+    """Numbers of the goals of each hand."""
     drakes: tuple[DrakeChecker, ...]
-    """The checker of each arm, or of each hand."""
+    """The checker of each hand."""
     partner: tuple[int | None, ...]
     """The goal that another arm reaches at the same time, of each goal."""
     hands: Hands
-    """The scenes of the hands, or arms."""
+    """The scenes of the hands."""
     jobs: int
     """Number of threads of the dense scans."""
 
@@ -80,21 +91,20 @@ class FileChecker:
         """
         measure = file.metadata["measure"]
         built = rebuild_scenes(file)
-        jobs_of_hands = [job for job, *_ in built]
-        task = whole_task(jobs_of_hands) if file.hands else jobs_of_hands[0].task
+        task = whole_task([job for job, *_ in built])
         return cls(
             tables=file.tables,
             size=file.configurations.size,
-            hand_of_goal=file.hand_of_goal,
+            goals=file.goals_of_hands,
             drakes=tuple(DrakeChecker(job, scene, measure) for job, scene, _ in built),
             partner=partners(task.goals),
-            hands=Hands([lowered for *_, lowered in built], measure),
+            hands=Hands.of([(job, lowered) for job, _, lowered in built], measure),
             jobs=jobs,
         )
 
     @property
     def problems(self) -> tuple[Problem, ...]:
-        """The problem of each arm, or of each hand."""
+        """The problem of each hand."""
         return self.hands.problems
 
     @property
@@ -102,32 +112,26 @@ class FileChecker:
         """Inverse kinematics of the arms: NUMERIC if that of one of them is."""
         return NUMERIC if NUMERIC in map(ik_of, self.problems) else ANALYTIC
 
-    def scored(self, h: int, g: int) -> tuple[int, int, int]:
-        """Return the number of the problem of a pair, its index in the scored grid, and its goal.
-
-        The problem is that of the arm of configuration h, or of the hand of goal g.
-        """
-        if self.hand_of_goal:
-            hand, goal = self.hand_of_goal[g]
-            return hand, h, goal
+    def hand(self, h: int, g: int) -> int:
+        """Return the hand that reaches a goal, or comes nearest to it."""
         table, row = divmod(h, self.size)
-        arm_size = self.size // len(self.problems)
-        arm, of_arm = divmod(row, arm_size)
-        return arm, table * arm_size + of_arm, g
+        hand = self.tables[table].scores.hand
+        return 0 if hand is None else int(hand[row, g])
 
-    def check(self, h: int, g: int, scan: Posture) -> Finding:
+    def check(self, h: int, g: int, posture: Posture) -> Finding:
         """Return Drake's finding for configuration h and goal g, and for the goal of its pair."""
-        part, scored, goal = self.scored(h, g)
-        partner = self.partner[g]
-        if partner is None or scan.other is None:
-            return self.drakes[part].check(scored, goal, scan.q, scan.value)
-        other, _, goal_of_other = self.scored(h, partner)
-        self.drakes[part].pose_other_arm(scan.other)
-        self.drakes[other].pose_other_arm(scan.q)
+        hand, partner = posture.hand, self.partner[g]
+        goal = self.goals[hand].index(g)
+        if partner is None or posture.other is None:
+            return self.drakes[hand].check(h, goal, posture.q, posture.value)
+        other = self.hand(h, partner)
+        self.drakes[hand].pose_other_arm(posture.other)
+        self.drakes[other].pose_other_arm(posture.q)
+        goal_of_other = self.goals[other].index(partner)
         return of_both(
-            self.drakes[part].check(scored, goal, scan.q, scan.value),
-            self.drakes[other].check(scored, goal_of_other, scan.other, scan.value),
-            scan.value,
+            self.drakes[hand].check(h, goal, posture.q, posture.value),
+            self.drakes[other].check(h, goal_of_other, posture.other, posture.value),
+            posture.value,
         )
 
     def dexterity(self, h: int, g: int) -> float:
@@ -141,8 +145,8 @@ class FileChecker:
         for h, g in pairs:
             partner = self.partner[g]
             other = None if partner is None else self.joints(h, partner)
-            scan = Posture(self.dexterity(h, g), self.joints(h, g), other)
-            findings.append(self.check(h, g, scan))
+            hand, value, q = self.hand(h, g), self.dexterity(h, g), self.joints(h, g)
+            findings.append(self.check(h, g, Posture(hand, value, q, other)))
             step()
         return findings
 
@@ -167,13 +171,13 @@ class FileChecker:
             refined = self.tables[pair.table].refined
             assert refined is not None
             at = pair.set, pair.member
-            # The origin has the arm and the observed state of the refined member.
+            # The origin has the observed state of the refined member.
             origin = pair.table * self.size + int(refined.origin[at])
-            part, scored, goal = self.scored(origin, pair.goal)
+            hand = 0 if refined.hand is None else int(refined.hand[*at, pair.goal])
             findings.append(
-                self.drakes[part].check_at(
-                    self.drakes[part].values(scored, refined.values[at]),
-                    goal,
+                self.drakes[hand].check_at(
+                    self.drakes[hand].values(origin, refined.values[at]),
+                    self.goals[hand].index(pair.goal),
                     refined.arm_joints[*at, pair.goal].astype(np.float64),
                     float(refined.dexterity[*at, pair.goal]),
                 )
@@ -200,61 +204,75 @@ class FileChecker:
             step()
         return short
 
-    def _runs(self, pairs: Pairs) -> list[Pairs]:
-        """Return the pairs divided where the problem, or that of the other arm, changes."""
-
-        def problems_of(pair: tuple[int, int]) -> tuple[int, int | None]:
-            h, g = pair
-            partner = self.partner[g]
-            other = None if partner is None else self.scored(h, partner)[0]
-            return self.scored(h, g)[0], other
-
-        return [list(run) for _, run in itertools.groupby(pairs, problems_of)]
-
     def _scans(self, pairs: Pairs) -> Iterator[tuple[tuple[int, int], Posture]]:
-        """Yield each pair with the best posture of its dense scan, in order."""
-        # Pairs of one problem at a time, in their order.
+        """Yield each pair with the best posture of its dense scans with all hands, in order."""
+        scans = [
+            _Scan(h, g, hand)
+            for h, g in pairs
+            for hand, goals in enumerate(self.goals)
+            if g in goals
+        ]
+        # Pairs of one hand, or two, at a time, in their order.
         parts = [
             run[start : start + SLICE]
-            for run in self._runs(pairs)
+            for run in (
+                list(run)
+                for _, run in itertools.groupby(
+                    sorted(scans, key=lambda one: one.hand),
+                    lambda one: (one.hand, self._other(one)),
+                )
+            )
             for start in range(0, len(run), SLICE)
         ]
         pool = Parallel(n_jobs=self.jobs, prefer="threads", return_as="generator")
+        best: dict[tuple[int, int], Posture] = {}
+        count = Counter((one.h, one.g) for one in scans)
+        waiting = iter(pairs)
+        pair = next(waiting, None)
         for part, postures in zip(parts, pool(map(delayed(self._scan), parts)), strict=True):
-            yield from zip(part, postures, strict=True)
+            for one, posture in zip(part, postures, strict=True):
+                at = one.h, one.g
+                count[at] -= 1
+                if at not in best or posture.value > best[at].value:
+                    best[at] = posture
+            while pair is not None and not count[pair]:
+                yield pair, best[pair]
+                pair = next(waiting, None)
 
-    def _scan(self, part: Pairs) -> list[Posture]:
-        """Return the best posture of the dense scans of pairs of one problem."""
-        first = self.scored(*part[0])[0]
-        partner = self.partner[part[0][1]]
-        if partner is not None:
-            return self._scan_together(part, first, self.scored(part[0][0], partner)[0])
-        scored = np.array([self.scored(h, g)[1:] for h, g in part])
-        rows, joints = (
-            rows_at(self.hands.lowered[first].grid, scored[:, 0]),
-            np.empty((len(part), 7)),
-        )
-        pairs = np.stack([np.arange(len(part)), scored[:, 1]], axis=1)
-        values = dense_scans(self.problems[first], rows, pairs, DENSE_SAMPLES, joints)
-        return [Posture(float(v), q, None) for v, q in zip(values, joints, strict=True)]
+    def _other(self, scan: _Scan) -> int | None:
+        """Return the hand of the goal that is reached at the same time; None for none."""
+        partner = self.partner[scan.g]
+        return None if partner is None else self.hand(scan.h, partner)
 
-    def _scan_together(self, part: Pairs, first: int, second: int) -> list[Posture]:
+    def _scan(self, part: Sequence[_Scan]) -> list[Posture]:
+        """Return the best posture of the dense scans of pairs of one hand."""
+        hand, other = part[0].hand, self._other(part[0])
+        if other is not None:
+            return self._scan_together(part, hand, other)
+        rows = rows_at(self.hands.lowered[hand].grid, [one.h for one in part])
+        joints = np.empty((len(part), 7))
+        goals = [self.goals[hand].index(one.g) for one in part]
+        pairs = np.stack([np.arange(len(part)), goals], axis=1)
+        values = dense_scans(self.problems[hand], rows, pairs, DENSE_SAMPLES, joints)
+        return [Posture(hand, float(v), q, None) for v, q in zip(values, joints, strict=True)]
+
+    def _scan_together(self, part: Sequence[_Scan], first: int, second: int) -> list[Posture]:
         """Return the best pair of postures of dense scans of both arms."""
         two = self.hands.two(first, second)
         none = np.empty((0, 7))
         found = []
-        for h, g in part:
-            _, scored, goal = self.scored(h, g)
-            partner = self.partner[g]
+        for scan in part:
+            partner = self.partner[scan.g]
             assert partner is not None
-            goals = goal, self.scored(h, partner)[2]
             best = searched(
                 two,
-                rows_at(self.hands.lowered[first].grid, [scored]),
-                goals,
+                rows_at(self.hands.lowered[first].grid, [scan.h]),
+                (self.goals[first].index(scan.g), self.goals[second].index(partner)),
                 (none, none),
                 finest=DENSE_SAMPLES_OF_TWO,
                 most=DENSE_POSTURES_OF_TWO,
             )
-            found.append(Posture(-1.0, np.zeros(7), None) if best is None else Posture(*best))
+            found.append(
+                Posture(first, -1.0, np.zeros(7), None) if best is None else Posture(first, *best)
+            )
         return found

@@ -12,7 +12,7 @@ from tcs.model.scene import Observation
 from tcs.placement.constraints import Constraints
 from tcs.placement.scoring.catalogue import default_path, task_environment_pairs
 from tcs.placement.scoring.dry_run import estimate
-from tcs.placement.scoring.job import load_job
+from tcs.placement.scoring.job import load_jobs
 from tcs.placement.scoring.live import LiveScorer
 from tcs.placement.scoring.offline import score
 from tcs.placement.scoring.score_summary import summary
@@ -126,6 +126,7 @@ def estimate_all(
     now: Mapping[str, float],
     person: PersonLike | None,
     approach: bool | None = None,
+    arms: str | None = None,
     **_others: Any,
 ) -> list[dict[str, Any]]:
     """Estimate what scoring would take, for one task or, as `score_all_to_files`, for all.
@@ -140,6 +141,7 @@ def estimate_all(
         now: As for `tcs.score`.
         person: As for `tcs.score`.
         approach: As for `tcs.score`.
+        arms: As for `tcs.score`.
         **_others: Options of `tcs.score` that change nothing in the estimate.
 
     Raises:
@@ -151,11 +153,12 @@ def estimate_all(
         else ((task, environment or "wheelchair"),)
     )
     jobs_of = (
-        load_job(name, where, robot, constraints=constraints, now=now, person=person)
+        load_jobs(name, where, robot, constraints=constraints, now=now, person=person, arms=arms)
         for name, where in pairs
     )
     return [
-        estimate(job, measure=measure, jobs=jobs, approach=approach).to_json() for job in jobs_of
+        estimate(hands, measure=measure, jobs=jobs, approach=approach).to_json()
+        for hands in jobs_of
     ]
 
 

@@ -14,6 +14,7 @@ from tcs.model.grid import Axis, Grid, restricted
 from tcs.model.people import PersonLike
 from tcs.model.robots import (
     RobotFile,
+    arm_references,
     beside,
     links_of_arm,
     load_robot,
@@ -56,6 +57,9 @@ class JobOptions(TypedDict, total=False):
     person: PersonLike | None
     """Whose body the person has, as for `tcs.model.people.load_person`; by default that of the
     environment file. Goals on the person are moved to that body."""
+    arms: str | None
+    """Arm of goals that name none: one of the robot's, "both" for any of them, or None for the one
+    that the robot file describes."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -79,6 +83,8 @@ class Job:
     """Numbers of the goals in a task whose goals name several hands; () for a whole task."""
     other_joints: tuple[str, ...] = ()
     """Joints of the arm that works at the same time, which the scores of this one leave out."""
+    any_arm: bool = False
+    """Whether goals that name no arm may be reached by any."""
 
     @property
     def scored_grid(self) -> Grid:
@@ -106,6 +112,25 @@ class Job:
         return without_bodies(lowered, links_of_arm(self.spec.robot, self.other_joints[0]))
 
 
+def whole_task(jobs: Sequence[Job]) -> Task:
+    """Return the task whose goals are those of jobs, the job of each hand."""
+    if len(jobs) == 1:
+        return jobs[0].task
+    goals = {
+        number: goal
+        for job in jobs
+        for number, goal in zip(job.goal_numbers, job.task.goals, strict=True)
+    }
+    contacts = (pair for job in jobs for pair in job.task.allowed_contacts)
+    walls = (one for job in jobs for one in job.task.keep_out)
+    return dataclasses.replace(
+        jobs[0].task,
+        goals=tuple(goals[number] for number in sorted(goals)),
+        allowed_contacts=tuple(dict.fromkeys(contacts)),
+        keep_out=tuple(dict.fromkeys(walls)),
+    )
+
+
 def load_job(
     task: str | Path | Task,
     environment: str | Path | EnvironmentFile,
@@ -127,7 +152,7 @@ def load_job(
     jobs = load_jobs(task, environment, robot, **options)
     if len(jobs) > 1:
         raise TaskError(
-            f"This needs goals of one hand, but those of task '{jobs[0].task.name}' name "
+            f"This needs goals of one hand, but those of task '{jobs[0].task.name}' are of "
             f"{len(jobs)}: {'; '.join(str(job.hand) for job in jobs)}. Score the whole task with "
             "`tcs score`, or write a task of the goals of one hand."
         )
@@ -140,7 +165,7 @@ def load_jobs(
     robot: str | Path | RobotFile,
     **options: Unpack[JobOptions],
 ) -> tuple[Job, ...]:
-    """Return the job of each hand that the goals of a task name, one if they name none.
+    """Return the job of each hand that the goals of a task allow, one if they name none.
 
     Args:
         task: Name of a task, path of a task file, or a task.
@@ -152,7 +177,7 @@ def load_jobs(
         UnknownNameError: If a task, environment, robot, arm, tool, axis or body measure of that
             name does not exist.
         DataFileError: If a file cannot be used, or the task is not for that environment.
-        RobotError: If goals name an arm of a robot without several.
+        RobotError: If goals or the options name an arm of a robot without several.
         GridError: If the grid is empty or enormous, or a condition is invalid.
         SelectionError: If the present value of an axis to keep is missing or not scored.
     """
@@ -162,6 +187,10 @@ def load_jobs(
     person = options.get("person")
     if person is not None:
         environment = with_person(environment, person)
+    arms = options.get("arms")
+    own = () if arms is None else tuple(arm_references(robot, arms))
+    if len(own) == 1:
+        robot, own = arm_references(robot, own[0])[own[0]], ()
     given = robot if isinstance(robot, RobotFile) else load_robot(robot)
     # An environment of the user's own may take any task whose body frames it has.
     is_shipped = environment.name in environment_names()
@@ -171,7 +200,7 @@ def load_jobs(
             f"It is for: {', '.join(task.environments)}."
         )
     task = with_surface_goals(goals_on_person(task, environment), environment)
-    by_hand = task.goals_by_hand()
+    by_hand = _with_any_arm(task.goals_by_hand(), own)
     constraints = options.get("constraints", _NO_CONSTRAINTS)
     around = with_obstacles(environment, constraints.blocked)
     jobs = []
@@ -192,9 +221,22 @@ def load_jobs(
                 hand=hand,
                 goal_numbers=() if len(by_hand) == 1 else numbers,
                 other_joints=other_joints,
+                any_arm=bool(own),
             )
         )
     return tuple(jobs)
+
+
+def _with_any_arm(
+    goals: Mapping[Hand, tuple[int, ...]], arms: Sequence[str]
+) -> dict[Hand, tuple[int, ...]]:
+    """Return the goals of each hand where those that name no arm may be reached by any of some."""
+    found: dict[Hand, set[int]] = {}
+    for hand, numbers in goals.items():
+        any_arm = arms if not hand.arm and arms else (hand.arm,)
+        for arm in any_arm:
+            found.setdefault(dataclasses.replace(hand, arm=arm), set()).update(numbers)
+    return {hand: tuple(sorted(numbers)) for hand, numbers in found.items()}
 
 
 def _restricted_grid(

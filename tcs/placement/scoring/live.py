@@ -21,7 +21,12 @@ from tcs.placement.constraints import Constraints
 from tcs.placement.scoring.approaches import ApproachScorer, approach_lines
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.kernel_start import warm_up
-from tcs.placement.scoring.offline import NO_CONSTRAINTS, ScoringSetup
+from tcs.placement.scoring.offline import (
+    NO_CONSTRAINTS,
+    ScoringSetup,
+    load_setups,
+    score_setups,
+)
 from tcs.placement.scoring.sets import SetOptions
 from tcs.placement.store import ScoreFile
 
@@ -51,6 +56,7 @@ class LiveScorer:
         now: Mapping[str, float] | None = None,
         person: PersonLike | None = None,
         approach: bool | None = None,
+        arms: str | None = None,
         **sets: Unpack[SetOptions],
     ) -> None:
         """Load the models, build the scene and compile the kernel.
@@ -68,26 +74,28 @@ class LiveScorer:
             now: Present values of axes [m or rad], for the axes that the constraints keep.
             person: Whose body the person has, as for `tcs.score`.
             approach: As for `tcs.score`.
+            arms: As for `tcs.score`.
             **sets: Options of the kept sets.
 
         Raises:
             TcsError: The errors of `tcs.score`.
         """
-        self._setup = ScoringSetup.load(
+        self._setups = load_setups(
             task, environment, robot, measure=measure, jobs=jobs, sets=sets, only=only,
-            constraints=constraints, now=now, person=person, approach=approach,
+            constraints=constraints, now=now, person=person, approach=approach, arms=arms,
         )  # fmt: skip
-        lowered = self._job_at({}).lowered(self._setup.scene)
         self._scene_in_use = threading.Lock()
-        problem = build_problem(lowered.arrays, measure)
-        is_scored = self._setup.approach.is_scored
-        scorer = ApproachScorer(problem, approach_lines(self.job)) if is_scored else None
-        warm_up(problem, on_compile, scorer)
+        for setup in self._setups:
+            lowered = _job_at(setup, {}).lowered(setup.scene)
+            problem = build_problem(lowered.arrays, measure)
+            is_scored = setup.approach.is_scored
+            scorer = ApproachScorer(problem, approach_lines(setup.job)) if is_scored else None
+            warm_up(problem, on_compile, scorer)
 
     @property
     def job(self) -> Job:
-        """The job, with the observed states that `tcs.score` would score."""
-        return self._setup.job
+        """The job of the first hand, with the observed states that `tcs.score` would score."""
+        return self._setups[0].job
 
     def score(
         self,
@@ -124,26 +132,31 @@ class LiveScorer:
     def _score(self, observation: Observation, grid: Grid, begun: float) -> ScoreFile:
         """Score the base poses of a grid in the scene as it is observed, as its only user."""
         grid_axes = [axis.name for axis in self.job.grid.environment_axes]
-        found = estimate_joints(self._setup.scene, observation, grid_axes)
+        found = estimate_joints(self._setups[0].scene, observation, grid_axes)
         entry = {
             "joints": {name: float(value) for name, value in found.joints.items()},
             "frames": {name: [float(x) for x in at] for name, at in observation.frames.items()},
             "frame_position_error": found.position_error,
             "frame_rotation_error": found.rotation_error,
         }
-        job = dataclasses.replace(self._job_at(found.joints), grid=grid)
-        setup = dataclasses.replace(self._setup, job=job)
-        return setup.score(begun=begun, metadata={"observation": entry})
+        setups = [
+            dataclasses.replace(
+                setup, job=dataclasses.replace(_job_at(setup, found.joints), grid=grid)
+            )
+            for setup in self._setups
+        ]
+        return score_setups(setups, begun=begun, metadata={"observation": entry})
 
-    def _job_at(self, joints: Mapping[str, float]) -> Job:
-        """Return the job with the one observed state of these joint values; others are 0."""
-        joints = {**{axis.name: 0.0 for axis in self.job.observed}, **joints}
-        axes = []
-        for name, value in joints.items():
-            is_angle = self._setup.scene.built.environment_joints.is_revolute(name)
-            start = math.degrees(value) if is_angle else value
-            axes.append(Axis(name, "deg" if is_angle else "m", start, 0.0, 1))
-        return dataclasses.replace(self.job, observed=tuple(axes))
+
+def _job_at(setup: ScoringSetup, joints: Mapping[str, float]) -> Job:
+    """Return the job with the one observed state of these joint values; others are 0."""
+    joints = {**{axis.name: 0.0 for axis in setup.job.observed}, **joints}
+    axes = []
+    for name, value in joints.items():
+        is_angle = setup.scene.built.environment_joints.is_revolute(name)
+        start = math.degrees(value) if is_angle else value
+        axes.append(Axis(name, "deg" if is_angle else "m", start, 0.0, 1))
+    return dataclasses.replace(setup.job, observed=tuple(axes))
 
 
 def score_observed(
@@ -158,6 +171,7 @@ def score_observed(
     now: Mapping[str, float] | None = None,
     person: PersonLike | None = None,
     approach: bool | None = None,
+    arms: str | None = None,
     **sets: Unpack[SetOptions],
 ) -> ScoreFile:
     """Score a task in the scene as it is observed, on the whole grid of the environment.
@@ -175,6 +189,7 @@ def score_observed(
         now: Present values of axes [m or rad], for the axes that the constraints keep.
         person: Whose body the person has, as for `tcs.score`.
         approach: As for `tcs.score`.
+        arms: As for `tcs.score`.
         **sets: Options of the kept sets.
 
     Returns:
@@ -185,6 +200,6 @@ def score_observed(
     """
     scorer = LiveScorer(
         task, environment, robot, measure=measure, jobs=jobs, constraints=constraints, now=now,
-        person=person, approach=approach, **sets,
+        person=person, approach=approach, arms=arms, **sets,
     )  # fmt: skip
     return scorer.score(observation)

@@ -7,15 +7,16 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Self, Unpack
+from typing import Any, Unpack
 
 from tcs.files.blocks import BlockFolder
 from tcs.kernel.dexterity import DEFAULT_MEASURE, dexterity
 from tcs.model.grid import Grid
 from tcs.model.people import PersonLike
-from tcs.model.robots import RobotFile, arm_references
+from tcs.model.robots import BOTH, RobotFile, arm_references
 from tcs.model.scene import EnvironmentFile, Scene, body_frame_positions
 from tcs.model.tasks import Task, ToolLine
 from tcs.placement.constraints import (
@@ -25,10 +26,9 @@ from tcs.placement.constraints import (
     excluded_configurations,
 )
 from tcs.placement.scoring.approaches import ApproachChoice, approach_lines, choose_approach
-from tcs.placement.scoring.arms import score_arms
 from tcs.placement.scoring.engines import ScoringEngine
-from tcs.placement.scoring.hands import check_arms_are_free, score_hands
-from tcs.placement.scoring.job import Job, JobOptions, data_references, load_job, load_jobs
+from tcs.placement.scoring.hands import score_hands
+from tcs.placement.scoring.job import Job, JobOptions, data_references, load_jobs
 from tcs.placement.scoring.kept_sets import kept_sets
 from tcs.placement.scoring.person import person_entry
 from tcs.placement.scoring.robot_shapes import robot_shapes
@@ -75,60 +75,6 @@ class ScoringSetup:
     """Where finished blocks of the grid are kept; None to keep none."""
     engine: ScoringEngine | None = None
     """Who scores; None for `jobs` threads of this process."""
-
-    @classmethod
-    def load(
-        cls,
-        task: str | Path | Task,
-        environment: str | Path | EnvironmentFile,
-        robot: str | Path | RobotFile,
-        *,
-        measure: str,
-        jobs: int,
-        sets: SetOptions,
-        approach: bool | None = None,
-        build: Callable[[Job], Scene] = Job.scene,
-        **options: Unpack[JobOptions],
-    ) -> Self:
-        """Load and check everything, and build the scene.
-
-        The arguments are those of `tcs.score`; `build` returns the scene of the job, a new one or
-        an equal one that was kept.
-
-        Raises:
-            UnknownNameError: If a task, environment, robot, frame or measure of that name does not
-                exist.
-            DataFileError: If a file cannot be used, or the goals of the task name several hands.
-            GridError: If the grid is empty or enormous.
-            ArmClassError: If `approach` is requested where it cannot be scored.
-            TcsError: If an option of the sets is out of range.
-        """
-        dexterity(measure)
-        of_sets = checked_options(**sets)
-        job = load_job(task, environment, robot, **options)
-        scene = build(job)
-        choice = choose_approach(approach, [(job, scene)])
-        references = data_references(job, task, environment, robot)
-        return cls(job, scene, references, of_sets, measure, jobs, choice)
-
-    @classmethod
-    def load_hands(
-        cls,
-        task: str | Path | Task,
-        environment: str | Path | EnvironmentFile,
-        robot: str | Path | RobotFile,
-        *,
-        measure: str,
-        sets: SetOptions,
-        **options: Unpack[JobOptions],
-    ) -> tuple[Self, ...]:
-        """Load and check everything as `load`, and build the scene of each hand of the goals."""
-        dexterity(measure)
-        of_sets = checked_options(**sets)
-        return tuple(
-            cls(job, job.scene(), data_references(job, task, environment, robot), of_sets, measure)
-            for job in load_jobs(task, environment, robot, **options)
-        )
 
     def score(
         self,
@@ -218,7 +164,7 @@ class ScoringSetup:
 
         Args:
             scores: Scores of each observed state.
-            grid: Their grid: that of the job, or the same once for each arm.
+            grid: Their grid.
             begun: Start of the work, by `time.perf_counter` [s].
             entries: Entries of the metadata, of `Scored.entries` and others.
         """
@@ -281,9 +227,9 @@ def score(
         task: Name of a task, path of a task file, or a task.
         environment: Name of an environment, path of its file, or an environment.
         robot: Name of a robot, path of its file, or a robot.
-        arms: Name of one of the robot's arms, e.g. "left", or "both", to score all of them into one
-            file: every configuration then uses one arm, and the members of a set any of them. By
-            default the arm that the robot file describes.
+        arms: Arm of the goals that name none: one of the robot's, e.g. "left", or "both", to reach
+            each of them with the arm that reaches it best. By default the arm that the robot file
+            describes.
         measure: Dexterity measure to maximise at each goal: "isotropy", "inverse-condition", or
             one of them with a penalty near joint limits, "-limited" or "-limited-thesis".
             Equations: docs/method.md.
@@ -328,32 +274,71 @@ def score(
         OutputError: If blocks cannot be kept in their folder, or another process is at work there.
     """
     begun = time.perf_counter()
-    robots = {"": robot} if arms is None else arm_references(robot, arms)
-    loaded = {
-        arm: ScoringSetup.load_hands(
-            task, environment, of_arm, measure=measure, sets=sets, only=only,
-            constraints=constraints, now=now, person=person,
+    setups = load_setups(
+        task, environment, robot, measure=measure, jobs=jobs, sets=sets, approach=approach,
+        arms=arms, only=only, constraints=constraints, now=now, person=person,
+    )  # fmt: skip
+    setups = tuple(replace(setup, blocks=blocks, engine=engine) for setup in setups)
+    return score_setups(setups, begun=begun, on_progress=on_progress, on_compile=on_compile)
+
+
+def load_setups(
+    task: str | Path | Task,
+    environment: str | Path | EnvironmentFile,
+    robot: str | Path | RobotFile,
+    *,
+    measure: str,
+    jobs: int,
+    sets: SetOptions,
+    approach: bool | None = None,
+    build: Callable[[Job], Scene] = Job.scene,
+    **options: Unpack[JobOptions],
+) -> tuple[ScoringSetup, ...]:
+    """Load and check everything, and build the scene of each hand.
+
+    The arguments are those of `score`; `build` returns the scene of a job, a new one or an equal
+    one that was kept.
+
+    Raises:
+        TcsError: The errors of `score`.
+    """
+    dexterity(measure)
+    of_sets = checked_options(**sets)
+    arms = options.get("arms")
+    if arms is not None and arms != BOTH:
+        # The file names the robot of that arm.
+        robot = arm_references(robot, arms)[arms]
+        options["arms"] = None
+    built = [(job, build(job)) for job in load_jobs(task, environment, robot, **options)]
+    choice = choose_approach(approach, built)
+    return tuple(
+        ScoringSetup(
+            job, scene, data_references(job, task, environment, robot), of_sets, measure, jobs,
+            choice,
         )
-        for arm, of_arm in robots.items()
-    }  # fmt: skip
-    choice = choose_approach(
-        approach, ((setup.job, setup.scene) for setups in loaded.values() for setup in setups)
-    )
-    with_hands = {
-        arm: tuple(
-            replace(setup, jobs=jobs, approach=choice, blocks=blocks, engine=engine)
-            for setup in setups
-        )
-        for arm, setups in loaded.items()
-    }
-    hands = next(iter(with_hands.values()))
-    if len(with_hands) > 1:
-        check_arms_are_free(hands)
-        setups = {arm: setup for arm, (setup,) in with_hands.items()}
-        return score_arms(setups, begun=begun, on_progress=on_progress, on_compile=on_compile)
-    if len(hands) > 1:
-        return score_hands(hands, begun=begun, on_progress=on_progress, on_compile=on_compile)
-    return hands[0].score(begun=begun, on_progress=on_progress, on_compile=on_compile)
+        for job, scene in built
+    )  # fmt: skip
+
+
+def score_setups(
+    setups: Sequence[ScoringSetup],
+    *,
+    begun: float,
+    metadata: Mapping[str, Any] | None = None,
+    on_progress: Callable[[int, int], None] | None = None,
+    on_compile: Callable[[], None] | None = None,
+) -> ScoreFile:
+    """Score a job of one or several hands, and return its score file.
+
+    Args:
+        setups: The job of each hand.
+        begun: Start of the work, by `time.perf_counter` [s].
+        metadata: Further entries of the file's metadata.
+        on_progress: Called with the number of scored configurations and their total.
+        on_compile: Called before the kernel compiles, if it has to.
+    """
+    score_all = setups[0].score if len(setups) == 1 else partial(score_hands, setups)
+    return score_all(begun=begun, metadata=metadata, on_progress=on_progress, on_compile=on_compile)
 
 
 def _task_as_dict(task: Task) -> dict[str, Any]:

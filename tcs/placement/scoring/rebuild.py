@@ -6,29 +6,30 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from tcs.errors import SelectionError, StoreError, StoreMismatchError
+from tcs.errors import StoreError, StoreMismatchError
 from tcs.model.grid import Axis
 from tcs.model.scene import LoweredScene, Scene
 from tcs.placement.constraints import recorded_constraints
-from tcs.placement.scoring.job import Job, JobOptions, load_job, load_jobs
+from tcs.placement.scoring.hands import digest_of_hands
+from tcs.placement.scoring.job import Job, load_jobs
 from tcs.placement.scoring.person import KEY as PERSON
 from tcs.placement.scoring.person import recorded_person
-from tcs.placement.store import ScoreFile, check_scene, files_of_arms
+from tcs.placement.store import ARMS, ScoreFile, check_scene
 
 _MADE_FROM = ("task", "environment", "robot", "scene_digest")
 
 
 def made_from(file: ScoreFile) -> dict[str, Any]:
     """Return what identifies the scene of a score file, as plain containers."""
-    optional = [key for key in ("only", "constraints", PERSON) if key in file.metadata]
+    optional = [key for key in ("only", "constraints", PERSON, ARMS) if key in file.metadata]
     return {
         **{key: file.metadata[key] for key in (*_MADE_FROM, *optional)},
         "observed": file.observed,
     }
 
 
-def recorded_job(record: Mapping[str, Any]) -> Job:
-    """Return the job that the metadata of a score file names, before its scene is built.
+def recorded_jobs(record: Mapping[str, Any]) -> tuple[Job, ...]:
+    """Return the job of each hand that the metadata of a score file names, before it is built.
 
     Args:
         record: The metadata, or a record of `made_from`.
@@ -37,54 +38,20 @@ def recorded_job(record: Mapping[str, Any]) -> Job:
         UnknownNameError: If its task, environment or robot does not exist.
         DataFileError: If a file that it names cannot be used.
     """
-    return load_job(*_models(record), **_options(record))
-
-
-def _models(record: Mapping[str, Any]) -> tuple[str, str, str]:
-    """Return the references of task, environment and robot."""
-    return record["task"], record["environment"], record["robot"]
-
-
-def _options(record: Mapping[str, Any]) -> JobOptions:
-    """Return what of the scene is scored."""
-    return {"constraints": recorded_constraints(record), "person": recorded_person(record)}
-
-
-def rebuild_scene(file: ScoreFile, *, meshes: bool = False) -> tuple[Job, Scene, LoweredScene]:
-    """Return the job a file was scored from, its live scene, and that scene as arrays.
-
-    Args:
-        file: A score file.
-        meshes: Whether to load the robot's visual meshes, for display; this takes seconds.
-
-    Raises:
-        UnknownNameError: If its task, environment or robot does not exist.
-        DataFileError: If a file that it names cannot be used.
-        StoreMismatchError: If the models differ from those the file was made from.
-        SelectionError: If the file is of several arms or hands, each of which has a scene of its
-            own.
-    """
-    if file.arms:
-        raise SelectionError(
-            f"This needs one arm, but the score file is of {' and '.join(file.arms)}. Score one "
-            f"arm: tcs score {file.task['name']} --robot {file.metadata['robot']} --arms "
-            f"{file.arms[0]}"
-        )
-    if file.hands:
-        raise SelectionError(
-            f"This needs goals of one hand, but those of '{file.task['name']}' name "
-            f"{len(file.hands)}. Score a task of the goals of one hand; select, explain, map, "
-            "picture, export and verify take those of several."
-        )
-    job, scene, lowered = _built(recorded_job(file.metadata), file.observed_axes, meshes)
-    check_scene(file, lowered.digest())
-    return job, scene, lowered
+    return load_jobs(
+        record["task"],
+        record["environment"],
+        record["robot"],
+        constraints=recorded_constraints(record),
+        person=recorded_person(record),
+        arms=record.get(ARMS),
+    )
 
 
 def rebuild_scenes(
     file: ScoreFile, *, meshes: bool = False
 ) -> tuple[tuple[Job, Scene, LoweredScene], ...]:
-    """Return job, scene and arrays of each arm or hand of a file, one for a file without.
+    """Return job, scene and arrays of each hand of a file.
 
     Args:
         file: A score file.
@@ -95,23 +62,24 @@ def rebuild_scenes(
         DataFileError: If a file that it names cannot be used.
         StoreMismatchError: If the models differ from those the file was made from.
     """
-    if not file.hands:
-        return tuple(rebuild_scene(of_arm, meshes=meshes) for of_arm in files_of_arms(file))
-    jobs = load_jobs(*_models(file.metadata), **_options(file.metadata))
+    jobs = recorded_jobs(file.metadata)
     hands = [{**job.hand.to_json(), "goals": list(job.goal_numbers)} for job in jobs]
-    if hands != [{key: entry[key] for key in hands[0]} for entry in file.hands]:
+    recorded = [{key: entry[key] for key in hands[0]} for entry in file.hands]
+    if recorded != (hands if len(jobs) > 1 else []):
         raise StoreMismatchError(
             f"Scores of '{file.metadata['task']}' are of goals with other hands than those of the "
             "task now. Score it again; choosing from the file still works."
         )
     found = tuple(_built(job, file.observed_axes, meshes) for job in jobs)
     for number, (*_, lowered) in enumerate(found):
-        check_scene(file, lowered.digest(), number)
+        check_scene(file, lowered.digest(), number if file.hands else None)
     return found
 
 
-def rebuild_made_from(record: Mapping[str, Any], *, meshes: bool = False) -> tuple[Job, Scene]:
-    """Return the job and scene that a record of `made_from` identifies.
+def rebuild_made_from(
+    record: Mapping[str, Any], *, meshes: bool = False
+) -> tuple[tuple[Job, Scene], ...]:
+    """Return the job and scene of each hand that a record of `made_from` identifies.
 
     Args:
         record: The record.
@@ -129,14 +97,15 @@ def rebuild_made_from(record: Mapping[str, Any], *, meshes: bool = False) -> tup
     if not isinstance(observed, list) or not all(isinstance(axis, dict) for axis in observed):
         raise StoreError("'made_from' must hold 'observed' as a list of axes.")
     axes = tuple(Axis.from_dict(axis, where="observed") for axis in observed)
-    job, scene, lowered = _built(recorded_job(record), axes, meshes)
-    if lowered.digest() != record["scene_digest"]:
+    built = [_built(job, axes, meshes) for job in recorded_jobs(record)]
+    digest = digest_of_hands([lowered.digest() for *_, lowered in built])
+    if digest != record["scene_digest"]:
         raise StoreMismatchError(
             f"The plan for '{record['task']}' was made from other models (scene "
-            f"{record['scene_digest'][:12]}) than those installed now (scene "
-            f"{lowered.digest()[:12]}). Plan again."
+            f"{record['scene_digest'][:12]}) than those installed now (scene {digest[:12]}). Plan "
+            "again."
         )
-    return job, scene
+    return tuple((job, scene) for job, scene, _ in built)
 
 
 def _built(job: Job, observed: tuple[Axis, ...], meshes: bool) -> tuple[Job, Scene, LoweredScene]:

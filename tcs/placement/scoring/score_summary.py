@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from typing import Any
 
-from tcs.model.grid import Grid
 from tcs.placement.constraints import constraint_texts
 from tcs.placement.scoring.kernel_start import ANALYTIC
 from tcs.placement.store import APPROACH, WITHOUT_APPROACH, ScoreFile, state_to_json
@@ -81,13 +80,12 @@ def _set_summary(file: ScoreFile, members: tuple[int, ...]) -> dict[str, Any] | 
     """Return scores and members of a set of the nominal table; None if no goal is reached."""
     if not members:
         return None
-    grid = Grid.from_dict(file.grid)
     reachability, manipulability = file.nominal.sets.scores_of(members)
     return {
         # Seven sevenths add up to 1 only after rounding.
         "reachability": round(reachability, 12),
         "manipulability": round(manipulability, 12),
-        "members": [grid.configuration(h).to_json() for h in members],
+        "members": [file.member_to_json(file.nominal_index, h) for h in members],
     }
 
 

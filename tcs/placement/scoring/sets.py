@@ -132,7 +132,7 @@ def _representatives(
         place=place.astype(np.int64),
         tile=tiles_of(xy)[place],
         state=state if same_environment else np.zeros_like(state),
-        kind=state + candidates // grid.arm_size * (grid.arm_size // grid.state_size),
+        kind=state,
     )
     single = tc_manipulability(every.dexterity, scores.weights)
     total = tc_reachability(every.reached, scores.weights) + single
@@ -186,11 +186,11 @@ def _sets_of(
         min_distance=float(min_distance),
         same_environment=same_environment,
         state_size=grid.state_size,
-        arm_size=grid.arm_size,
         weights=scores.weights,
         candidates=candidates,
         reached=scores.reached[candidates],
         dexterity=scores.dexterity[candidates],
+        hand=None if scores.hand is None else scores.hand[candidates],
         cell=cell,
         cell_xy=cell_xy,
         pair_cells=pair_cells.astype(np.int32),

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol, Self
 
 import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
+from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.rows import Rows, rows_at
+from tcs.kernel.scores import Scores
 from tcs.model.scene import LoweredScene
+from tcs.model.tasks import partners
+from tcs.placement.scoring.job import Job, whole_task
 from tcs.placement.tables import Reason, ScoreTable
 
 if TYPE_CHECKING:
@@ -44,13 +47,33 @@ class Hands:
 
     lowered: Sequence[LoweredScene]
     """The scene of each hand, without the arm that works at the same time."""
-    measure: str
-    """Name of the dexterity measure."""
+    problems: tuple[Problem, ...]
+    """The problem of each hand."""
+    pairs: tuple[tuple[PlacedGoal, PlacedGoal], ...] = ()
+    """The pairs of goals that two arms reach at the same time, each goal by its hand."""
 
-    @cached_property
-    def problems(self) -> tuple[Problem, ...]:
-        """The problem of each hand."""
-        return tuple(build_problem(one.arrays, self.measure) for one in self.lowered)
+    @classmethod
+    def of(cls, built: Sequence[tuple[Job, LoweredScene]], measure: str) -> Self:
+        """Return the hands of a task.
+
+        Args:
+            built: The job of each hand, and its scene.
+            measure: Name of the dexterity measure.
+        """
+        places = {
+            goal: PlacedGoal(hand, place)
+            for hand, (job, _) in enumerate(built)
+            for place, goal in enumerate(job.goal_numbers)
+        }
+        task = whole_task([job for job, _ in built])
+        pairs = tuple(
+            (places[i], places[j])
+            for i, j in enumerate(partners(task.goals))
+            if j is not None and i < j
+        )
+        lowered = [scene for _, scene in built]
+        problems = tuple(build_problem(scene.arrays, measure) for scene in lowered)
+        return cls(lowered, problems, pairs)
 
     def two(self, first: int, second: int) -> TwoArms:
         """Return two of the hands, with memory of their own."""
@@ -66,8 +89,44 @@ class Hands:
         return a[int(bodies[0])], b[int(bodies[1])]
 
 
-class _Columns:
+class _Scored(Protocol):
     """The scores of one hand, to be changed goal by goal."""
+
+    reason: NDArray[np.uint8]
+    dexterity: NDArray[np.float32]
+
+    def joints_at(self, rows: NDArray[np.intp], goal: int) -> NDArray[np.float64]:
+        """Return the joints at a reached goal [rad], shape (n, 7)."""
+
+    def block(self, row: int, goal: int, names: tuple[str, str]) -> None:
+        """Name the bodies of a contact."""
+
+    def reach(self, row: int, goal: int, joints: NDArray[np.float64]) -> None:
+        """Replace the joints of a reached pair."""
+
+
+class _OfRows:
+    """Scores of rows as the kernel gives them."""
+
+    def __init__(self, scores: Scores) -> None:
+        self.reason, self.dexterity = scores.reason, scores.dexterity
+        self._scores = scores
+
+    def joints_at(self, rows: NDArray[np.intp], goal: int) -> NDArray[np.float64]:
+        """Return the joints at a reached goal [rad], shape (n, 7)."""
+        return np.asarray(self._scores.joints[rows, goal], dtype=np.float64)
+
+    def block(self, row: int, goal: int, _: tuple[str, str]) -> None:
+        """Leave the contact without a code: the scene of either arm lacks the other one."""
+        self._scores.contact[row, goal] = NO_CONTACT
+
+    def reach(self, row: int, goal: int, joints: NDArray[np.float64]) -> None:
+        """Replace the joints of a reached pair."""
+        self._scores.joints[row, goal] = joints
+
+
+class _Columns:
+    """Scores of a table."""
 
     def __init__(self, table: ScoreTable) -> None:
         self.reason, self.pair = table.reason.copy(), table.pair.astype(np.int32)
@@ -81,10 +140,6 @@ class _Columns:
     def joints_at(self, rows: NDArray[np.intp], goal: int) -> NDArray[np.float64]:
         """Return the joints at a reached goal [rad], shape (n, 7)."""
         return np.asarray(self.joints[self._row[rows, goal]], dtype=np.float64)
-
-    def refuse(self, rows: NDArray[np.intp], goal: int, reason: Reason) -> None:
-        """Replace reached pairs by a reason."""
-        self.reason[rows, goal], self.dexterity[rows, goal] = reason, 0.0
 
     def block(self, row: int, goal: int, names: tuple[str, str]) -> None:
         """Name the bodies of a contact."""
@@ -109,12 +164,7 @@ class _Columns:
 
 
 def together(
-    tables: Sequence[ScoreTable],
-    pairs: Sequence[tuple[PlacedGoal, PlacedGoal]],
-    hands: Hands,
-    *,
-    first_row: int,
-    jobs: int,
+    tables: Sequence[ScoreTable], hands: Hands, *, first_row: int, jobs: int
 ) -> list[ScoreTable]:
     """Return the scores of hands with pairs of goals reached by two arms at the same time.
 
@@ -124,31 +174,61 @@ def together(
 
     Args:
         tables: The scores of each hand by itself, in one observed state.
-        pairs: The pairs of goals.
-        hands: The scenes of the hands.
+        hands: The hands.
         first_row: Index of the first row of the tables in the scored grid.
         jobs: Number of threads; the scores do not depend on it.
     """
     columns = [_Columns(table) for table in tables]
-    for a, b in pairs:
+    grid = hands.lowered[0].grid
+    _check(columns, hands, lambda rows: rows_at(grid, first_row + rows), jobs)
+    return [column.table() for column in columns]
+
+
+def together_at(parts: Sequence[Scores], hands: Hands, rows: Rows) -> None:
+    """Change the scores of rows with each hand by itself to those of both arms at once.
+
+    Args:
+        parts: The scores of each hand; changed.
+        hands: The hands.
+        rows: The configurations.
+    """
+    if hands.pairs:
+        _check([_OfRows(part) for part in parts], hands, rows.at, 1)
+
+
+def _check(
+    columns: Sequence[_Scored],
+    hands: Hands,
+    rows_of: Callable[[NDArray[np.intp]], Rows],
+    jobs: int,
+) -> None:
+    """Change the scores of hands by themselves to those of both arms at once.
+
+    Args:
+        columns: The scores of each hand.
+        hands: The hands.
+        rows_of: Returns configurations, given by rows of the scores.
+        jobs: Number of threads.
+    """
+    for a, b in hands.pairs:
         one, other = columns[a.hand], columns[b.hand]
         alone = [
             column.reason[:, goal] == Reason.REACHED for column, (_, goal) in ((one, a), (other, b))
         ]
-        one.refuse(np.flatnonzero(alone[0] & ~alone[1]), a.goal, Reason.OTHER_GOAL_UNREACHED)
-        other.refuse(np.flatnonzero(alone[1] & ~alone[0]), b.goal, Reason.OTHER_GOAL_UNREACHED)
+        _refuse(one, np.flatnonzero(alone[0] & ~alone[1]), a.goal, Reason.OTHER_GOAL_UNREACHED)
+        _refuse(other, np.flatnonzero(alone[1] & ~alone[0]), b.goal, Reason.OTHER_GOAL_UNREACHED)
         rows = np.flatnonzero(alone[0] & alone[1])
         slices = [rows[start : start + SLICE] for start in range(0, rows.size, SLICE)]
         known = [(one.joints_at(some, a.goal), other.joints_at(some, b.goal)) for some in slices]
         found = Parallel(n_jobs=jobs, prefer="threads")(
-            delayed(_pairs_of_postures)(hands, a, b, first_row + some, *joints)
+            delayed(_pairs_of_postures)(hands, a, b, rows_of(some), *joints)
             for some, joints in zip(slices, known, strict=True)
         )
         for some, of_slice in zip(slices, found, strict=True):
             for row, pair in zip(some.tolist(), of_slice, strict=True):
                 if pair.joints is None:
                     for column, goal in ((one, a.goal), (other, b.goal)):
-                        column.refuse(np.array([row]), goal, Reason.ARMS_BLOCKED)
+                        _refuse(column, np.array([row]), goal, Reason.ARMS_BLOCKED)
                     names = hands.names(a.hand, b.hand, pair.bodies)
                     one.block(row, a.goal, names)
                     other.block(row, b.goal, names[::-1])
@@ -158,7 +238,11 @@ def together(
                 for column, goal, q in ((one, a.goal, 0), (other, b.goal, 1)):
                     column.dexterity[row, goal] = lesser
                     column.reach(row, goal, pair.joints[q])
-    return [column.table() for column in columns]
+
+
+def _refuse(column: _Scored, rows: NDArray[np.intp], goal: int, reason: Reason) -> None:
+    """Replace reached pairs by a reason."""
+    column.reason[rows, goal], column.dexterity[rows, goal] = reason, 0.0
 
 
 class _Found(NamedTuple):
@@ -176,20 +260,19 @@ def _pairs_of_postures(
     hands: Hands,
     a: PlacedGoal,
     b: PlacedGoal,
-    configurations: NDArray[np.intp],
+    rows: Rows,
     first: NDArray[np.float64],
     second: NDArray[np.float64],
 ) -> list[_Found]:
     """Return the best pair of postures of each configuration that reaches both goals."""
     two = hands.two(a.hand, b.hand)
-    rows = rows_at(hands.lowered[a.hand].grid, configurations)
     bodies = two.contacts(rows.torso, first, second)
     is_posed = not any(
         len(hands.lowered[hand].arrays.freedom) and np.any(hands.lowered[hand].arrays.freedom[goal])
         for hand, goal in (a, b)
     )
     found = []
-    for n in range(len(configurations)):
+    for n in range(len(rows.state)):
         if bodies[n, 0] < 0:
             found.append(_Found((first[n], second[n]), None, bodies[n]))
             continue

@@ -118,10 +118,7 @@ def admitted_candidates(
                 f"{footprint.radius:g} m about its base. Score the task again for its footprint."
             )
     for obstacle in constraints.blocked:
-        remaining &= ~np.concatenate(
-            [blocked_bodies(obstacle, of_arm.postures) for of_arm in tables.arms]
-        )
-        candidate, goal = blocked_pairs(obstacle, postures_of_arms(tables), remaining)
+        candidate, goal = blocked_pairs(obstacle, tables.postures, remaining)
         reached, dexterity = reached.copy(), dexterity.copy()
         reached[candidate, goal], dexterity[candidate, goal] = False, 0.0
         remaining &= reached.any(axis=1)
@@ -134,29 +131,26 @@ def admitted_candidates(
 
 
 def blocked_pairs(
-    obstacle: Obstacle, arms: Sequence[tuple[Postures, int]], admitted: BoolArray
+    obstacle: Obstacle, hands: Sequence[Postures], admitted: BoolArray
 ) -> tuple[IntArray, IntArray]:
-    """Return candidates and goals whose stored arm solution an obstacle blocks, shapes (n,).
+    """Return candidates and goals whose stored solution an obstacle blocks, shapes (n,).
+
+    It blocks all solutions of a hand where it touches the robot's body as it is with that hand.
 
     Args:
         obstacle: The obstacle.
-        arms: Postures and number of candidates of each arm, in the order of the candidates.
+        hands: Postures of each hand.
         admitted: Candidates to examine, shape (C,).
     """
-    candidates, goals, start = [], [], 0
-    for postures, count in arms:
-        stop = start + count
-        hit = blocked_solutions(obstacle, postures, admitted[start:stop])
+    candidates, goals = [], []
+    for postures in hands:
+        body = blocked_bodies(obstacle, postures)
         candidate, goal = postures.pairs
-        candidates.append(candidate[hit] + start)
+        hit = blocked_solutions(obstacle, postures, admitted & ~body)
+        hit |= (body & admitted)[candidate]
+        candidates.append(candidate[hit])
         goals.append(goal[hit])
-        start = stop
     return np.concatenate(candidates), np.concatenate(goals)
-
-
-def postures_of_arms(tables: SelectionTables) -> list[tuple[Postures, int]]:
-    """Return postures and number of candidates of each arm, for `blocked_pairs`."""
-    return [(of_arm.postures, len(of_arm.sets.candidates)) for of_arm in tables.arms]
 
 
 def _bases(

@@ -400,6 +400,9 @@ class _Query:
             constraints=self.found.left if self.found is not None else (),
             footprint=self.found.footprint if self.found is not None else None,
             warnings=self.found.warnings if self.found is not None else (),
+            hands=tables.hands_of(np.where(self.scores[0], tables.sets.served, 0)[member])
+            if tables.hand_names
+            else (),
             seconds=0.0,
         )
 

@@ -17,7 +17,7 @@ from tcs.placement.selection.admission import Left
 from tcs.placement.selection.alternatives import SetPositions
 from tcs.placement.selection.index import SetIndex
 from tcs.placement.selection.observed import Match
-from tcs.placement.store import ScoreFile, files_of_arms
+from tcs.placement.store import ScoreFile
 from tcs.placement.store.robot_shapes import RobotShapes
 from tcs.placement.tables import RefinedTable, ScoreTable, SetTable, SuccessTable
 
@@ -41,20 +41,18 @@ class SelectionTables:
     """The grid of initial configurations."""
     success: SuccessTable | None = None
     """Estimated success under error of some of the sets, if any."""
-    read_shapes: Callable[[], RobotShapes | None] | None = None
-    """Returns the robot's shapes, if they are known."""
+    read_shapes: Callable[[int], RobotShapes | None] | None = None
+    """Returns the robot's shapes with a hand, given its number, if they are known."""
     read_scores: Callable[[], ScoreTable] | None = None
     """Returns the stored solutions."""
     read_frames: Callable[[], dict[str, FloatArray]] | None = None
     """Returns the positions of the body frames in W for each environment state [m], (states, 3)."""
-    read_arms: Callable[[], tuple[SelectionTables, ...]] | None = None
-    """Returns the tables of each arm, in a file of several; None for one arm."""
     refined: RefinedTable | None = None
     """Sets refined between the grid points, if any."""
     derived: dict[str, Any] = field(default_factory=dict, repr=False)
     """What was derived from the sets, by name; of a file, kept for its next selection."""
-    has_hands: bool = False
-    """Whether goals name several hands, with shapes of their own."""
+    hand_names: tuple[str, ...] = ()
+    """Name of each hand, in a file of several."""
 
     @classmethod
     def of(cls, file: ScoreFile, table: int | None = None) -> SelectionTables:
@@ -65,53 +63,57 @@ class SelectionTables:
             chosen.sets,
             file.configurations,
             chosen.success,
-            partial(getattr, file, "robot_shapes"),
+            file.shapes_of_hand,
             partial(getattr, chosen, "scores"),
             partial(_frames, file, number),
-            partial(_of_arms, file, number) if file.arms else None,
             chosen.refined,
             chosen.derived,
-            bool(file.hands),
+            file.hand_names,
         )
 
     @cached_property
     def shapes(self) -> RobotShapes | None:
-        """The robot's shapes, None if they are not known."""
-        return None if self.read_shapes is None else self.read_shapes()
-
-    @property
-    def arms(self) -> tuple[SelectionTables, ...]:
-        """The tables of each arm, whose candidates come one arm after the other; or these."""
-        if self.read_arms is None:
-            return (self,)
-        if "arms" not in self.derived:
-            self.derived["arms"] = self.read_arms()
-        found: tuple[SelectionTables, ...] = self.derived["arms"]
-        return found
+        """The robot's shapes with the first hand, None if they are not known."""
+        return None if self.read_shapes is None else self.read_shapes(0)
 
     @cached_property
-    def postures(self) -> Postures:
-        """Where the robot's shapes are, prepared for obstacles.
+    def postures(self) -> tuple[Postures, ...]:
+        """Where the robot's shapes are with each hand, prepared for obstacles.
 
         Raises:
-            SelectionError: If the robot's shapes are not known, or differ from goal to goal.
+            SelectionError: If the robot's shapes are not known.
         """
-        if self.has_hands:
-            raise SelectionError(
-                "Contact with an obstacle seen later is checked for one hand, but goals of the "
-                "file name several. Forbid the region instead, or score with the obstacle."
-            )
-        kept = self.derived.get("postures")
-        if isinstance(kept, Postures) and kept.shapes is self.shapes:
+        kept: tuple[Postures, ...] | None = self.derived.get("postures")
+        if kept is not None and kept[0].shapes is self.shapes:
             return kept
-        if self.shapes is None or self.read_scores is None:
+        shapes = [
+            None if self.read_shapes is None else self.read_shapes(hand)
+            for hand in range(max(1, len(self.hand_names)))
+        ]
+        if self.read_scores is None or None in shapes:
             raise SelectionError(
                 "The score file does not hold the robot's shapes, so nothing is known about "
                 "contact with an obstacle. Score the task again, or forbid the region instead."
             )
-        found = Postures(self.shapes, self.sets, self.grid, self.read_scores())
+        scores = self.read_scores()
+        found = tuple(
+            Postures(of_hand, self.sets, self.grid, scores, hand)
+            for hand, of_hand in enumerate(shapes)
+            if of_hand is not None
+        )
         self.derived["postures"] = found
         return found
+
+    def hands_of(self, served: NDArray[np.uint8]) -> tuple[tuple[str | None, ...], ...]:
+        """Return the name of the hand that serves each goal from each member; () for one hand.
+
+        Args:
+            served: Number of the hand plus 1, 0 for none, shape (m, G).
+        """
+        if not self.hand_names:
+            return ()
+        names = (None, *self.hand_names)
+        return tuple(tuple(names[hand] for hand in member) for member in served.tolist())
 
     @property
     def index(self) -> SetIndex:
@@ -146,11 +148,6 @@ def index_of(sets: SetTable, derived: dict[str, Any]) -> SetIndex:
     found = derived["index"]
     assert isinstance(found, SetIndex)
     return found
-
-
-def _of_arms(file: ScoreFile, table: int) -> tuple[SelectionTables, ...]:
-    """Return one of the tables of a file, for each arm."""
-    return tuple(SelectionTables.of(part, table) for part in files_of_arms(file))
 
 
 def _frames(file: ScoreFile, table: int) -> dict[str, FloatArray]:
@@ -210,6 +207,9 @@ class Choice:
     """Number of the refined set; None for a set of the grid."""
     warnings: tuple[str, ...] = ()
     """What the user should know about the choice, one sentence each."""
+    hands: tuple[tuple[str | None, ...], ...] = ()
+    """For each of `members` the name of the hand that serves each goal, None for a goal it does not
+    reach; () in a file of one hand."""
 
     def to_json(self, measure: str) -> dict[str, Any]:
         """Return the choice as plain containers, as printed by `tcs select --json`.
@@ -224,7 +224,7 @@ class Choice:
         """
         plain: dict[str, Any] = {
             "measure": measure,
-            "members": [self.members[i].to_json() for i in self.order],
+            "members": self.members_to_json(),
             "configurations": [self.indices[i] for i in self.order],
             # The sum of seven sevenths is 1 only after rounding.
             "reachability": round(self.reachability, 12),
@@ -255,6 +255,18 @@ class Choice:
             plain["warnings"] = list(self.warnings)
         return plain
 
+    def members_to_json(self) -> list[dict[str, Any]]:
+        """Return the members as plain containers, in the order of the tour.
+
+        In a file of several hands `hand` is, for each goal, the name of the hand that serves it
+        from there, null where it is not reached.
+        """
+        plain: list[dict[str, Any]] = [{**self.members[i].to_json()} for i in self.order]
+        for member, i in zip(plain, self.order, strict=True):
+            if self.hands:
+                member["hand"] = list(self.hands[i])
+        return plain
+
     def placed(self, grid: Grid) -> SetPositions:
         """Return where the bases are, and the states of the environment; on the grid or off it."""
         bases = np.array([(member.base_x, member.base_y) for member in self.members])
@@ -268,7 +280,7 @@ class Choice:
         """
         names = ("reachability", "manipulability", "cost", "utility", "net_utility")
         return {
-            "members": [self.members[i].to_json() for i in self.order],
+            "members": self.members_to_json(),
             **{name: round(getattr(self, name), 12) for name in names},
             "moves": list(self.moves),
             **({} if self.success is None else {"success": self.success}),

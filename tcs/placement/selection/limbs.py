@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tcs.errors import SelectionError
 from tcs.placement.constraints import Constraints
-from tcs.placement.selection.admission import Admitted, blocked_pairs, postures_of_arms
+from tcs.placement.selection.admission import Admitted, blocked_pairs
 from tcs.placement.selection.choice import SelectionTables
 from tcs.placement.selection.observed import Match
 from tcs.placement.store import ScoreFile, StateTables
@@ -123,7 +123,7 @@ def _unblocked(
     tested[theirs] = admitted[mine]
     reached = reached.copy()
     for obstacle in constraints.blocked:
-        reached[blocked_pairs(obstacle, postures_of_arms(tables), tested)] = False
+        reached[blocked_pairs(obstacle, tables.postures, tested)] = False
     return reached
 
 
@@ -161,6 +161,7 @@ def scores_at_limbs(file: ScoreFile, match: Match) -> ScoreTable:
         pair_names=names,
         arm_joints=common.arm_joints[reason[common.reached] == Reason.REACHED],
         weights=common.weights,
+        hand=common.hand,
     )
 
 

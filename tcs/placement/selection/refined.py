@@ -139,6 +139,7 @@ class RefinedQuery:
             success=success,
             success_ci95=interval,
             unreachable=int(np.count_nonzero(~self.legs.reachable[self.tables.sets.cell])),
+            hands=self.tables.hands_of(refined.served[row, :count]),
             seconds=0.0,
             refined=row,
         )

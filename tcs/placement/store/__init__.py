@@ -5,7 +5,6 @@ They are read through an allow-list.
 
 from __future__ import annotations
 
-from tcs.placement.store.arms import OF_ARM, file_of_arm, files_of_arms
 from tcs.placement.store.encoding import FORMAT, FORMAT_VERSION
 from tcs.placement.store.files import load_scores, save_scores
 from tcs.placement.store.motion_file import (
@@ -19,6 +18,7 @@ from tcs.placement.store.score_file import (
     APPROACH,
     ARMS,
     HANDS,
+    OF_HAND,
     REQUIRED_METADATA,
     WITHOUT_APPROACH,
     ScoreFile,
@@ -33,15 +33,13 @@ __all__ = [
     "FORMAT",
     "FORMAT_VERSION",
     "HANDS",
-    "OF_ARM",
+    "OF_HAND",
     "REQUIRED_METADATA",
     "WITHOUT_APPROACH",
     "MotionFile",
     "ScoreFile",
     "StateTables",
     "check_scene",
-    "file_of_arm",
-    "files_of_arms",
     "load_motions",
     "load_scores",
     "motion_path",

@@ -30,7 +30,7 @@ from tcs.placement.tables import Reason, ScoreTable, SetTable
 FORMAT = "tcs scores"
 """Name of the format."""
 
-_PER_PAIR = ("reason", "pair_plus_one")
+_PER_PAIR = ("reason", "pair_plus_one", "hand")
 """Arrays with a number for each configuration and goal, often all equal."""
 
 FORMAT_VERSION = 4
@@ -128,6 +128,7 @@ def _encode_scores(scores: ScoreTable, sets: SetTable) -> dict[str, Any]:
         "pair_plus_one": compress(_plus_one(scores.pair)),
         "pair_names": [list(names) for names in scores.pair_names],
         "arm_joints": compress(scores.arm_joints),
+        **({} if scores.hand is None else {"hand": compress(scores.hand)}),
     }
 
 
@@ -156,6 +157,7 @@ def _decode_scores(encoded: dict[str, Any], sets: SetTable, size: int) -> ScoreT
         pair_names=tuple((first, second) for first, second in names),
         arm_joints=decompress(encoded, "arm_joints", "f4", (reached, 7)),
         weights=sets.weights,
+        hand=decompress(encoded, "hand", "u1", reason.shape) if "hand" in encoded else None,
     )
 
 

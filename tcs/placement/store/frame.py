@@ -22,10 +22,9 @@ def score_frame(file: ScoreFile, *, everything: bool = False) -> pd.DataFrame:
         everything: Whether to include configurations that reach no goal.
 
     Returns:
-        Columns: the observed axes and the axes of the grid (angles as `..._deg`), `arm` if
-        configurations use one of several, `reachability` (P_R), `manipulability` (P_M), and for
-        each goal g `reason_g` and `dexterity_g`. The flat indices start again for each observed
-        state.
+        Columns: the observed axes and the axes of the grid (angles as `..._deg`), `reachability`
+        (P_R), `manipulability` (P_M), and for each goal g `reason_g`, `dexterity_g` and, in a file
+        of several hands, `hand_g`. The flat indices start again for each observed state.
     """
     states = zip(file.observed_states, file.tables, strict=True)
     frames = [_frame(file, state, table, everything) for state, table in states]
@@ -46,15 +45,15 @@ def _frame(
         )
         for axis in grid.axes
     }
-    if grid.arms:
-        numbers = rows // grid.arm_size
-        columns["arm"] = pd.Categorical.from_codes(numbers, pd.Index(grid.arms))
     columns["reachability"] = scores.reachability()[rows]
     columns["manipulability"] = scores.manipulability()[rows]
     names = [reason.name.lower() for reason in Reason]
     for g in range(scores.goals):
         columns[f"reason_{g}"] = pd.Categorical.from_codes(scores.reason[rows, g], pd.Index(names))
         columns[f"dexterity_{g}"] = scores.dexterity[rows, g]
+        if scores.hand is not None:
+            hand = np.where(scores.reached[rows, g], scores.hand[rows, g].astype(np.int64), -1)
+            columns[f"hand_{g}"] = pd.Categorical.from_codes(hand, pd.Index(file.hand_names))
     return pd.DataFrame(columns, index=pd.Index(rows, name="configuration"))
 
 

@@ -22,6 +22,7 @@ def encode_refined(refined: RefinedTable | None) -> dict[str, Any] | None:
         "reached": compress(refined.reached.astype(np.uint8)),
         "dexterity": compress(refined.dexterity),
         "arm_joints": compress(refined.arm_joints),
+        **({} if refined.hand is None else {"hand": compress(refined.hand)}),
         "objective": compress(refined.objective),
         "success": None if refined.success is None else _encode_success(refined.success),
     }
@@ -55,6 +56,7 @@ def decode_refined(encoded: object, weights: np.ndarray[Any, Any]) -> RefinedTab
         objective=decompress(encoded, "objective", "f8", origin.shape[:1]),
         weights=weights,
         success=_decode_success(encoded.get("success"), origin.shape[:1]),
+        hand=decompress(encoded, "hand", "u1", shape) if "hand" in encoded else None,
     )
 
 

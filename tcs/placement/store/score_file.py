@@ -10,6 +10,7 @@ from functools import cached_property, partial
 from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tcs.errors import StoreError, StoreMismatchError
 from tcs.files.plain import plain
@@ -36,12 +37,13 @@ DESCRIPTIONS = ("metadata", "task", "robot", "environment", "grid", "body_frames
 """Parts of a file that are plain containers."""
 
 ARMS = "arms"
-"""Entry of the metadata of a file of several arms: robot, description, scene digest and others of
-each arm, by its name in the order of the grid."""
+"""Entry of the metadata of a file whose goals may be reached by any arm of the robot: "both"."""
 
 HANDS = "hands"
-"""Entry of the metadata of a file whose goals name several hands: of each its arm, tool, goals,
-description of the robot, scene digest and others."""
+"""Entry of the metadata of a file of several hands: of each its arm, tool, goals, description of
+the robot, scene digest and others. A goal may be one of several hands, any of which counts."""
+OF_HAND = ("scene_digest", "robot_shapes", "ik", "self_contact")
+"""Entries of the metadata that differ between hands."""
 APPROACH, WITHOUT_APPROACH = "approach", "no_approach"
 """Entries of the metadata: how a file was scored with approach, or why it was not where nobody
 decided that."""
@@ -117,6 +119,7 @@ def check_sets_of(scores: ScoreTable, sets: SetTable) -> None:
         and np.array_equal(sets.candidates, candidates)
         and np.array_equal(sets.reached, scores.reached[candidates])
         and np.array_equal(sets.dexterity, scores.dexterity[candidates])
+        and _are_equal(sets.hand, None if scores.hand is None else scores.hand[candidates])
     ):
         raise StoreError("sets do not belong to the scores.")
 
@@ -165,7 +168,11 @@ class ScoreFile:
         only = self.metadata.get("only", [])
         if not isinstance(only, list) or not all(isinstance(text, str) for text in only):
             raise StoreError("metadata 'only' must be a list of conditions.")
-        self._check_arms()
+        if self.metadata.get(ARMS, "both") != "both":
+            raise StoreError(
+                "The file is of an earlier version, in which each configuration used one of "
+                "several arms. Score the task again: any arm may then serve any goal."
+            )
         self._check_hands()
         self._check_tables()
         records = self.metadata.get("robustness")
@@ -174,26 +181,8 @@ class ScoreFile:
         ):
             raise StoreError("metadata 'robustness' must be a list with an entry for each table.")
 
-    def _check_arms(self) -> None:
-        """Check that the metadata describes each arm of the grid."""
-        entries = self.metadata.get(ARMS, {})
-        keys = {"robot": str, "description": dict, "scene_digest": str}
-        if (
-            not isinstance(entries, dict)
-            or tuple(entries) != self.arms
-            or not all(
-                isinstance(entry, dict)
-                and all(isinstance(entry.get(key), expected) for key, expected in keys.items())
-                for entry in entries.values()
-            )
-        ):
-            raise StoreError(
-                f"metadata '{ARMS}' must describe the arms of the grid, each with "
-                f"{', '.join(keys)}."
-            )
-
     def _check_hands(self) -> None:
-        """Check that the metadata describes each hand, and divides the goals among them."""
+        """Check that the metadata describes each hand, and gives every goal to one at least."""
         entries = self.metadata.get(HANDS, [])
         keys = {"goals": list, "description": dict, "scene_digest": str, "arm": str, "tool": str}
         is_well_formed = isinstance(entries, list) and all(
@@ -205,15 +194,15 @@ class ScoreFile:
         if not is_well_formed or (
             entries
             and (
-                self.arms
-                or not self.tables
-                or sorted(goal for entry in entries for goal in entry["goals"])
-                != list(range(self.tables[0].sets.weights.size))
+                not self.tables
+                or {goal for entry in entries for goal in entry["goals"]}
+                != set(range(self.tables[0].sets.weights.size))
+                or any(table.sets.hand is None for table in self.tables)
             )
         ):
             raise StoreError(
-                f"metadata '{HANDS}' must divide the goals among hands, each with "
-                f"{', '.join(keys)}."
+                f"metadata '{HANDS}' must give every goal to hands, each with {', '.join(keys)}, "
+                "and the tables the hand of each goal."
             )
 
     def _check_tables(self) -> None:
@@ -231,7 +220,7 @@ class ScoreFile:
             sets = table.sets
             if len(sets.candidates) and sets.candidates[-1] >= grid.size:
                 raise StoreError(f"sets of more configurations than the grid has, {grid.size}.")
-            if (sets.state_size, sets.arm_size) != (grid.state_size, grid.arm_size):
+            if sets.state_size != grid.state_size:
                 raise StoreError("sets have another number of environment states than the grid.")
             _check_success(table.success, sets)
             _check_refined(table.refined, sets, grid)
@@ -249,27 +238,36 @@ class ScoreFile:
         return Grid.from_dict(self.grid)
 
     @property
-    def arms(self) -> tuple[str, ...]:
-        """Names of the arms that configurations use, one each; () in a file of one arm."""
-        return self.configurations.arms
-
-    @property
     def hands(self) -> tuple[dict[str, Any], ...]:
-        """What is recorded of each hand that goals name; () if they name none, or the same."""
+        """What is recorded of each hand; () in a file of one."""
         return tuple(self.metadata.get(HANDS, ()))
 
     @cached_property
-    def hand_of_goal(self) -> tuple[tuple[int, int], ...]:
-        """The hand of each goal, and the number of the goal among those of the hand.
+    def hand_names(self) -> tuple[str, ...]:
+        """Arm and tool of each hand as one name, e.g. "right+spoon"; () in a file of one."""
+        return tuple(
+            "+".join(part for part in (entry["arm"], entry["tool"]) if part) or "bare"
+            for entry in self.hands
+        )
 
-        () in a file without hands.
+    @cached_property
+    def goals_of_hands(self) -> tuple[tuple[int, ...], ...]:
+        """Numbers of the goals of each hand, of one hand in a file of one."""
+        if not self.hands:
+            return (tuple(range(self.nominal.sets.weights.size)),)
+        return tuple(tuple(entry["goals"]) for entry in self.hands)
+
+    def member_to_json(self, table: int, h: int) -> dict[str, Any]:
+        """Return a candidate as plain containers, in a file of several hands with those it uses.
+
+        `hand` is then the name of the hand that serves each goal, null where it is not reached.
         """
-        places = {
-            goal: (number, place)
-            for number, entry in enumerate(self.hands)
-            for place, goal in enumerate(entry["goals"])
-        }
-        return tuple(places[goal] for goal in sorted(places))
+        plain: dict[str, Any] = {**self.configurations.configuration(h).to_json()}
+        if self.hands:
+            sets, names = self.tables[table].sets, (None, *self.hand_names)
+            row = int(np.searchsorted(sets.candidates, h))
+            plain["hand"] = [names[hand] for hand in sets.served[row].tolist()]
+        return plain
 
     @cached_property
     def observed_axes(self) -> tuple[Axis, ...]:
@@ -292,14 +290,20 @@ class ScoreFile:
 
     @cached_property
     def robot_shapes(self) -> RobotShapes | None:
-        """The robot's collision shapes, None in files without them; of the first of several arms.
+        """The robot's collision shapes, with the first of several hands; None without them.
 
         Raises:
             StoreError: If they are malformed, or have other torso levels than the grid.
         """
-        entries = self.metadata[ARMS][self.arms[0]] if self.arms else self.metadata
-        entries = self.hands[0] if self.hands else entries
-        stored = entries.get("robot_shapes")
+        return self.shapes_of_hand(0)
+
+    def shapes_of_hand(self, hand: int) -> RobotShapes | None:
+        """Return the robot's collision shapes with a hand.
+
+        Raises:
+            StoreError: As `robot_shapes`.
+        """
+        stored = (self.hands[hand] if self.hands else self.metadata).get("robot_shapes")
         if stored is None:
             return None
         shapes = RobotShapes.from_dict(stored)
@@ -321,6 +325,13 @@ class ScoreFile:
         """Number of the nominal state."""
         norms = [sum(value**2 for value in state.values()) for state in self.observed_states]
         return int(np.argmin(norms))
+
+
+def _are_equal(one: NDArray[np.uint8] | None, other: NDArray[np.uint8] | None) -> bool:
+    """Return whether two arrays are equal, or both missing."""
+    if one is None or other is None:
+        return one is other
+    return np.array_equal(one, other)
 
 
 def _check_success(success: SuccessTable | None, sets: SetTable) -> None:

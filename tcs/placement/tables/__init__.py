@@ -9,7 +9,6 @@ from __future__ import annotations
 from tcs.placement.tables.base_lattice import BaseLattice
 from tcs.placement.tables.equations import tc_manipulability, tc_reachability
 from tcs.placement.tables.motions import MotionOutcome, MotionTable
-from tcs.placement.tables.points import Points
 from tcs.placement.tables.refined import RefinedSet, RefinedSuccess, RefinedTable
 from tcs.placement.tables.scores import Reason, ScoreTable
 from tcs.placement.tables.sets import SetTable
@@ -19,7 +18,6 @@ __all__ = [
     "BaseLattice",
     "MotionOutcome",
     "MotionTable",
-    "Points",
     "Reason",
     "RefinedSet",
     "RefinedSuccess",

@@ -95,20 +95,17 @@ def best_per_place(grid: Grid, values: NDArray[Any], state: int | None = None) -
 
     Args:
         grid: The grid.
-        values: A value for each configuration of the state, or of the grid if `state` is None, of
-            each arm, in flat order.
+        values: A value for each configuration of the state, or of the grid if `state` is None, in
+            flat order.
         state: Number of the environment's state, in C order over its axes; None for all states.
     """
     axes = _axes(grid, state)
     others = tuple(i for i, axis in enumerate(axes) if axis.name not in _PLACE)
-    by_arm = values.reshape(-1, *(axis.count for axis in axes)).max(axis=0)
-    return np.asarray(by_arm.max(axis=others))
+    return np.asarray(values.reshape([axis.count for axis in axes]).max(axis=others))
 
 
-def rows_of_state(grid: Grid, state: int | None = None) -> slice | NDArray[np.int64]:
+def rows_of_state(grid: Grid, state: int | None = None) -> slice:
     """Return the flat indices of the configurations in one state of the environment, None for all.
-
-    They are those of the first arm, then those of the second.
 
     Raises:
         GridError: If there is no state of that number.
@@ -118,11 +115,7 @@ def rows_of_state(grid: Grid, state: int | None = None) -> slice | NDArray[np.in
     states = math.prod(grid.environment_shape)
     if not 0 <= state < states:
         raise GridError(f"no state {state} of the environment: it has {states}, from 0.")
-    size = grid.state_size
-    if not grid.arms:
-        return slice(state * size, (state + 1) * size)
-    arm, along = np.meshgrid(np.arange(len(grid.arms)), np.arange(size), indexing="ij")
-    return np.asarray(arm * grid.arm_size + state * size + along).ravel()
+    return slice(state * grid.state_size, (state + 1) * grid.state_size)
 
 
 def _axes(grid: Grid, state: int | None) -> tuple[Axis, ...]:

@@ -79,6 +79,8 @@ class RefinedTable(ArrayTable):
     """Weights of the goals, sum 1, shape (G,)."""
     success: RefinedSuccess | None = None
     """Their success under error; None unless that of the table's sets was estimated."""
+    hand: NDArray[np.uint8] | None = None
+    """Number of the hand of each posture, shape (K, m, G); None if there is only one."""
 
     def __post_init__(self) -> None:
         """Check the arrays against each other and make them read-only.
@@ -96,6 +98,7 @@ class RefinedTable(ArrayTable):
             "arm_joints": (np.float32, (count, width, goals, 7)),
             "objective": (np.float64, (count,)),
             "weights": (np.float64, (goals,)),
+            **({} if self.hand is None else {"hand": (np.uint8, (count, width, goals))}),
         }
         self._check_arrays("refined table", shapes)
         is_member = self.origin != NO_MEMBER
@@ -132,9 +135,14 @@ class RefinedTable(ArrayTable):
             row: Number of the set.
         """
         return tuple(
-            grid.between(self.values[row, i].tolist(), int(self.origin[row, i]))
-            for i in range(int(self.sizes[row]))
+            grid.between(self.values[row, i].tolist()) for i in range(int(self.sizes[row]))
         )
+
+    @property
+    def served(self) -> NDArray[np.uint8]:
+        """Number of the hand that reaches a goal from a member plus 1, 0 for none, (K, m, G)."""
+        hand = np.zeros(self.reached.shape, np.uint8) if self.hand is None else self.hand
+        return np.where(self.reached, hand + np.uint8(1), np.uint8(0))
 
     @property
     def sizes(self) -> NDArray[np.int64]:

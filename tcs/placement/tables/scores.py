@@ -69,6 +69,9 @@ class ScoreTable(ArrayTable):
     shape (R, 7). Those of an arm of six joints follow a 0."""
     weights: NDArray[np.float64]
     """Weights of the goals, sum 1, shape (G,)."""
+    hand: NDArray[np.uint8] | None = None
+    """Number of the hand that reaches the goal, or comes nearest to it, shape (H, G); None if there
+    is only one."""
 
     def __post_init__(self) -> None:
         """Check the arrays against each other and make them read-only.
@@ -84,6 +87,7 @@ class ScoreTable(ArrayTable):
             "reason": (np.uint8, (rows, goals)),
             "pair": (_pair_type(self.pair), (rows, goals)),
             "arm_joints": (np.float32, (None, 7)),
+            **({} if self.hand is None else {"hand": (np.uint8, (rows, goals))}),
         }
         self._check_arrays("score table", shapes)
         self._check_ranges()

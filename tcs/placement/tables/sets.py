@@ -55,10 +55,7 @@ class SetTable(ArrayTable):
     same_environment: bool
     """Whether all members of a set share the state of the environment, e.g. the bed's height."""
     state_size: int
-    """Number of configurations per arm and state of the environment."""
-    arm_size: int
-    """Number of configurations per arm: h // arm_size is the arm of h, and h % arm_size //
-    state_size the state of the environment."""
+    """Number of configurations per state of the environment: h // state_size is that of h."""
     weights: NDArray[np.float64]
     """Weights of the goals, sum 1, shape (G,)."""
     candidates: NDArray[np.int32]
@@ -68,6 +65,9 @@ class SetTable(ArrayTable):
     a singular arm posture can have at a goal it does reach."""
     dexterity: NDArray[np.float32]
     """Dexterity of the candidates, 0 where not reached, shape (C, G)."""
+    hand: NDArray[np.uint8] | None = None
+    """Number of the hand that reaches a goal from a candidate, as in the scores, shape (C, G); None
+    if there is only one."""
     cell: NDArray[np.int32]
     """Base cell of each candidate, shape (C,)."""
     cell_xy: NDArray[np.float64]
@@ -125,6 +125,7 @@ class SetTable(ArrayTable):
             "member_reachability": (np.float64, (count,)),
             "member_manipulability": (np.float32, (count,)),
             "member_sum": (np.float32, (count,)),
+            **({} if self.hand is None else {"hand": (np.uint8, (count, goals))}),
         }
         self._check_arrays("set table", shapes)
         require(
@@ -136,10 +137,7 @@ class SetTable(ArrayTable):
         )
         require(0.0 <= self.min_distance < np.inf, "set table: min_distance must be finite, >= 0.")
         require(0.0 <= self.tile < np.inf, "set table: tile must be finite, >= 0.")
-        require(
-            self.state_size > 0 and self.arm_size > 0 and self.arm_size % self.state_size == 0,
-            "set table: state_size must be positive, and arm_size a multiple of it.",
-        )
+        require(self.state_size > 0, "set table: state_size must be positive.")
         require(isinstance(self.lattice, BaseLattice), "set table: lattice must be a BaseLattice.")
         self._check_candidates()
         self._check_pairs()
@@ -244,7 +242,13 @@ class SetTable(ArrayTable):
     @cached_property
     def state(self) -> NDArray[np.int64]:
         """Number of the environment's state of each candidate, shape (C,)."""
-        return self.candidates.astype(np.int64) % self.arm_size // self.state_size
+        return self.candidates.astype(np.int64) // self.state_size
+
+    @cached_property
+    def served(self) -> NDArray[np.uint8]:
+        """Number of the hand that reaches a goal from a candidate plus 1, 0 for none, (C, G)."""
+        hand = np.zeros(self.reached.shape, np.uint8) if self.hand is None else self.hand
+        return np.where(self.reached, hand + np.uint8(1), np.uint8(0))
 
     @cached_property
     def by_cell(self) -> NDArray[np.int64]:

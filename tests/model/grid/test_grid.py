@@ -1,4 +1,3 @@
-import dataclasses
 import itertools
 import math
 import pickle
@@ -240,28 +239,3 @@ def test_environment_states_are_those_of_the_flat_order():
     each = grid.size // len(states)
     for i, state in enumerate(states):
         assert dict(grid.configuration(i * each).environment) == state
-
-
-def test_configurations_of_the_second_arm_follow_those_of_the_first():
-    one = Grid.from_spec(WHEELCHAIR)
-    grid = dataclasses.replace(one, arms=("left", "right"))
-    assert (grid.size, grid.arm_size, grid.shape) == (2 * one.size, one.size, (2, *one.shape))
-    assert grid.of_one_arm == one
-    h = one.size + 7
-    assert grid.configuration(h) == dataclasses.replace(one.configuration(7), arm="right")
-    assert grid.indices(h).tolist() == one.indices(7).tolist()
-    assert grid.flat(one.indices(7), "right") == h
-    assert grid.state_of([7, h]).tolist() == [0, 0]
-    assert Grid.from_dict(grid.to_dict()) == grid
-    with pytest.raises(UnknownNameError, match="unknown arm 'middle'"):
-        grid.flat(one.indices(7), "middle")
-    with pytest.raises(GridError, match="one arm only"):
-        one.arm_number("left")
-
-
-@pytest.mark.parametrize("arms", [("left",), ("left", "left"), ("left", "")])
-def test_arms_must_be_different_names(arms):
-    with pytest.raises(GridError, match="two or more different names"):
-        dataclasses.replace(Grid.from_spec(WHEELCHAIR), arms=arms)
-    with pytest.raises(GridError, match="'arms' must be a list of names"):
-        Grid.from_dict({**Grid.from_spec(WHEELCHAIR).to_dict(), "arms": "left"})

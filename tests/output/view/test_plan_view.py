@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 from tcs.cli.app import app
 from tcs.model.grid import InitialConfiguration
 from tcs.motion import GoalResult, MotionPlan, Segment, StopPlan, Timed, save_plan
+from tcs.motion.plan_check import PlanHand
 from tcs.output.view import PlanView, make_plan_view, plan_view, swept, write_plan_view
 from tcs.output.view.plan_view import plan_frames, show_plan_view
 from tcs.output.view.scene_objects import SceneShapes
@@ -124,8 +125,8 @@ def posture_of(corners, way):
 
 def test_the_command_plays_a_plan(moved, scene, monkeypatch, tmp_path):
     job = load_job("shaving", "wheelchair", "pr2")
-    monkeypatch.setattr(plan_view, "rebuild_made_from", lambda *_, meshes: (job, scene))
-    monkeypatch.setattr(plan_view, "check_names", lambda *_: None)
+    hand = PlanHand(job, scene, tuple(range(8)))
+    monkeypatch.setattr(plan_view, "hands_of", lambda *_, meshes: {"": hand})
     assert make_plan_view(moved).title.endswith("wheelchair · Willow Garage PR2, left arm")
     save_plan(tmp_path / "plan.json", moved)
     page = tmp_path / "page.html"

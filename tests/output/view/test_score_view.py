@@ -7,6 +7,7 @@ import pytest
 import tcs
 from tcs.errors import OutputError
 from tcs.model.grid import InitialConfiguration
+from tcs.output.report.score.scored_scenes import ScoredScene
 from tcs.output.view import (
     ScoreView,
     Viewer,
@@ -52,11 +53,11 @@ def built(monkeypatch, scene):
     """Give every view the scene of the session; return whether meshes were requested, by call."""
     requested = []
 
-    def scored_scene(_file, _shown, *, meshes):
+    def scored_scenes(_file, _shown, *, meshes):
         requested.append(meshes)
-        return load_job("shaving", "wheelchair", "pr2"), scene
+        return (ScoredScene(load_job("shaving", "wheelchair", "pr2"), scene),)
 
-    monkeypatch.setattr(score_view, "scored_scene", scored_scene)
+    monkeypatch.setattr(score_view, "scored_scenes", scored_scenes)
     return requested
 
 

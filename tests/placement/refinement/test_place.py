@@ -12,7 +12,6 @@ from tcs.model.robots import load_robot
 from tcs.model.scene import EMPTY_ENVIRONMENT, Scene, SceneSpec
 from tcs.placement.refinement import base_poses, joint_path
 from tcs.placement.refinement.poses import PoseScene, PoseScorer
-from tcs.placement.tables import Points
 
 
 def line(length, count=8):
@@ -95,11 +94,11 @@ def test_base_poses_are_scored_alike_together_and_alone():
     values = np.stack([x, y, yaw, np.zeros_like(x)], axis=-1).reshape(-1, 4)
     values = np.random.default_rng(0).permutation(values)
     scorer = PoseScorer.of(scene, line(0.3), None, jobs=2)
-    points = Points(values, np.zeros(len(values), dtype=np.int64))
+    points = values
     together = scorer.score(points)
     assert 0 < together.reached.sum() < together.reached.size
     for i in range(len(values)):
-        alone = scorer.score(Points(values[i : i + 1], points.arm[:1]))
+        alone = scorer.score(values[i : i + 1])
         for array, row in zip(together, alone, strict=True):
             np.testing.assert_array_equal(array[i : i + 1], row)
 

@@ -29,7 +29,7 @@ from tcs.placement.refinement.search import Evaluated, LocalSearch, Walk
 from tcs.placement.refinement.space import Space
 from tcs.placement.robustness import PerturbedPoints, Trials, success_summary
 from tcs.placement.store.encoding import decode, encode
-from tcs.placement.tables import Points, Reason, RefinedSet, RefinedSuccess
+from tcs.placement.tables import Reason, RefinedSet, RefinedSuccess
 from tests.beside import BESIDE
 
 NAMES, ONE = ("mean", "low", "high"), np.array([0.5])
@@ -51,7 +51,7 @@ def refined(scored):
 def test_scores_at_grid_points_are_those_of_the_grid(scored):
     grid = scored.configurations
     at = np.stack([*grid.values(np.arange(grid.size)).values()], axis=1)
-    found = PointScorer.of(scored, 0).score(Points(at, np.zeros(len(at), dtype=np.int64)))
+    found = PointScorer.of(scored, 0).score(at)
     scores = scored.nominal.scores
     np.testing.assert_array_equal(found.reached, scores.reached)
     np.testing.assert_array_equal(found.dexterity, scores.dexterity)
@@ -144,7 +144,7 @@ def check_estimates(file):
     assert found.samples == 40
     for row in range(len(table.origin)):
         values = table.values[row, : table.sizes[row]]
-        reached = samples.reached(Points(values, np.zeros(len(values), dtype=np.int64))).any(axis=0)
+        reached = samples.reached(values).any(axis=0)
         assert found.mean[row] == pytest.approx(reached.mean(axis=0) @ trials.weights, abs=1e-12)
 
 
@@ -252,8 +252,8 @@ def test_walks_move_to_sets_that_satisfy_the_condition(scored, rng):
     tried = []
 
     def keeps(offered):
-        tried.extend(points.values for points in offered)
-        return np.array([np.all(points.values[:, 1] < -0.95) for points in offered])
+        tried.extend(points for points in offered)
+        return np.array([np.all(points[:, 1] < -0.95) for points in offered])
 
     search = LocalSearch(
         scorer, Space.of(scored.configurations, sets), ScoreObjective(sets.weights), rng
@@ -268,7 +268,7 @@ def test_walks_move_to_sets_that_satisfy_the_condition(scored, rng):
 
 def stand(x):
     rows = np.zeros((1, 2))
-    return Evaluated(np.array([[x]]), np.zeros(1, dtype=np.int64), *[rows] * 5)
+    return Evaluated(np.array([[x]]), *[rows] * 6)
 
 
 def test_walks_move_back_to_the_surest_place():
@@ -277,7 +277,7 @@ def test_walks_move_back_to_the_surest_place():
 
         def reached(self, points):
             # Two goals between 0.5 and 2.5, one elsewhere up to 3.5, none beyond.
-            x = points.values[:, 0]
+            x = points[:, 0]
             return np.stack([x < 3.5, (x > 0.5) & (x < 2.5)], axis=-1)[:, None]
 
     walks = [Walk((0,), stand(3.0), 9.0), Walk((1,), stand(0.0), 0.0), Walk((2,), stand(5.0), 5.0)]
@@ -292,7 +292,7 @@ def test_walks_move_back_to_the_surest_place():
 def test_walks_move_back_until_they_keep_the_floor():
     class Floor:
         def keeps(self, sets):
-            return np.array([points.values[0, 0] <= self.most for points in sets])
+            return np.array([points[0, 0] <= self.most for points in sets])
 
     screen, judge = Floor(), Floor()
     screen.most, judge.most = 2.5, 1.5
@@ -326,7 +326,7 @@ def test_perturbed_points_on_the_grid_are_those_of_trials(scored):
     offsets = trials.errors.draw(12, 3)
     members = np.array(scored.nominal.sets.best)
     at = np.stack([*scored.configurations.values(members).values()], axis=1)
-    points = Points(at, np.zeros(len(at), dtype=np.int64))
+    points = at
     found = PerturbedPoints(trials, offsets, 2).reached(points)
     np.testing.assert_array_equal(found, trials.reached(members, offsets))
     assert found.any()
@@ -337,7 +337,7 @@ def test_reasons_without_errors_are_those_of_the_grid(scored):
     still = {name: np.zeros(2) for name in trials.errors.draw(1, 0)}
     members = np.arange(0, scored.configurations.size, 3)
     at = np.stack([*scored.configurations.values(members).values()], axis=1)
-    points = Points(at, np.zeros(len(at), dtype=np.int64))
+    points = at
     found = PerturbedPoints(trials, still, 2).reasons(points)
     expected = scored.nominal.scores.reason[members]
     np.testing.assert_array_equal(found, np.stack([expected, expected], axis=1))
@@ -354,11 +354,11 @@ def test_kept_environments_change_no_answer(scored):
     low[0, -1], high[0, -1] = 0.15, 0.30
     kept = PerturbedPoints(trials, offsets, 1)
     for values in (low, high, low):
-        points = Points(values, np.zeros(1, dtype=np.int64))
+        points = values
         fresh = PerturbedPoints(trials, offsets, 1).reached(points)
         np.testing.assert_array_equal(kept.reached(points), fresh)
     assert len(kept.environments) == 1
-    assert np.any(kept.reached(Points(low, points.arm)) != kept.reached(Points(high, points.arm)))
+    assert np.any(kept.reached(low) != kept.reached(high))
 
 
 @pytest.mark.parametrize("body_collisions", ["paper", "none"])

@@ -17,8 +17,7 @@ def walk_of(dexterity):
     reached = dexterity > 0.0
     present = Evaluated(
         np.arange(count, dtype=np.float64)[:, None],
-        np.zeros(count, dtype=np.int64),
-        *(reached, dexterity, np.zeros((count, 2, 7))),
+        *(reached, dexterity, np.zeros((count, 2, 7)), np.zeros((count, 2), np.uint8)),
         *(reached, dexterity),
     )
     value = (reached.any(axis=0) + dexterity.max(axis=0)) @ WEIGHTS

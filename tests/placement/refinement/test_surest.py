@@ -15,7 +15,6 @@ from tcs.placement.refinement.space import Space
 from tcs.placement.refinement.staged import StagedSamples, best_pairs
 from tcs.placement.refinement.surest import SurestSearch, surest_pairs, surest_triples
 from tcs.placement.robustness import PerturbedPoints, Trials
-from tcs.placement.tables import Points
 from tests.beside import BESIDE
 
 SAMPLES = 40
@@ -41,12 +40,12 @@ class Made:
         return Made(self.all, self.rows[rows])
 
     def reached(self, points):
-        self.evaluated += points.values[:, 0].astype(int).tolist()
-        return self.all[points.values[:, 0].astype(int)][:, self.rows]
+        self.evaluated += points[:, 0].astype(int).tolist()
+        return self.all[points[:, 0].astype(int)][:, self.rows]
 
 
 def points(*numbers):
-    return Points(np.array(numbers, dtype=float)[:, None], np.zeros(len(numbers), dtype=np.int64))
+    return np.array(numbers, dtype=float)[:, None]
 
 
 @pytest.fixture
@@ -112,10 +111,11 @@ def test_two_members_change_together_as_in_a_plain_loop(rng, monkeypatch, member
     nothing = np.zeros((5, 3))
     choices = [
         Evaluated(
-            *points(*range(5 * i, 5 * i + 5)),
+            points(*range(5 * i, 5 * i + 5)),
             nothing > 0.0,
             nothing,
             nothing,
+            nothing.astype(np.uint8),
             nothing > 0.0,
             nothing,
         )
@@ -235,9 +235,9 @@ def test_success_and_its_pairs_through_the_product(scored, monkeypatch):
     choosing = trials.errors.draw(SAMPLES, 0, stream="refinement choice")
     samples = RememberedSamples(PerturbedPoints(trials, choosing, 2))
     values = table.values[0, : table.sizes[0]]
-    chosen = Points(values, np.zeros(len(values), dtype=np.int64))
+    chosen = values
     at = np.stack([*scored.configurations.values(np.array(sets.best)).values()], axis=1)
-    best = Points(at, np.zeros(len(at), dtype=np.int64))
+    best = at
     found, before = successes(samples, trials.weights, [chosen, best])
     assert found >= before
 

@@ -14,8 +14,8 @@ from tcs.motion import check_approaches
 from tcs.motion.approach_check import ApproachScene
 from tcs.placement.refinement import PointScorer, evaluate_refined, score_members
 from tcs.placement.robustness import PerturbedPoints, Trials
-from tcs.placement.scoring.rebuild import rebuild_scene
-from tcs.placement.tables import Points, Reason, RefinedSet
+from tcs.placement.scoring.rebuild import rebuild_scenes
+from tcs.placement.tables import Reason, RefinedSet
 from tests.beside import BESIDE
 
 APPROACH = (Reason.APPROACH_LIMITS, Reason.APPROACH_BLOCKED)
@@ -36,7 +36,7 @@ def refined(scored):
 
 def points_of(file, flat):
     values = file.configurations.values(np.asarray(flat))
-    return Points(np.stack([*values.values()], axis=1), np.zeros(len(flat), dtype=np.int64))
+    return np.stack([*values.values()], axis=1)
 
 
 def test_scores_at_grid_points_are_those_of_the_grid(scored):
@@ -53,7 +53,7 @@ def test_scores_at_grid_points_are_those_of_the_grid(scored):
 
 
 def test_refined_sets_reach_what_they_can_approach(refined):
-    table, scene = refined.nominal.refined, ApproachScene.of(*rebuild_scene(refined))
+    table, scene = refined.nominal.refined, ApproachScene.of(*rebuild_scenes(refined)[0])
     assert table.reached.any()
     for row, member in np.argwhere(table.reached.any(axis=2)):
         there = scene.at(table.values[row, member], {})
@@ -117,7 +117,7 @@ def test_the_base_is_where_it_is_at_the_torso_height(scored, monkeypatch):
     """A lower base, seen from the arm, blocks few approaches: no other test here would show it."""
     trials = Trials.of(scored)
     trials.start.ensure()
-    of_levels, placed = trials.arms[0].approaches.scene.moved, []
+    of_levels, placed = trials.hands[0].approaches.scene.moved, []
     assert np.ptp(of_levels, axis=0).any()
 
     def noted(problem, lines, rows, pairs, memory):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tcs.placement.robustness import evaluate, losses
+from tcs.placement.scoring.hands import HandScores
 from tcs.placement.tables import Reason
 
 
@@ -68,7 +69,7 @@ def test_a_person_moved_away_is_too_far(chair_trials):
     away = {name: np.zeros(3) for name in evaluation.offsets}
     # The seated person's x points backwards: -0.9 m is far in front of the chair.
     away["person_x"] = np.array([0.0, -0.9, 0.9])
-    found = chair_trials.outcome(int(evaluation.sets[0][0]), away)
+    found = chair_trials.outcome(int(evaluation.sets[0][0]), away).scores
     assert (found.reason[0] == Reason.REACHED).any()
     assert not (found.reason[1:] == Reason.REACHED).all(axis=1).any()
     assert (found.reason[1:] == Reason.TOO_FAR).any()
@@ -99,9 +100,9 @@ def by_hand():
         robot_bodies=("base", "hand"), environment_bodies=("bed", "person", "chair")
     )
     trials = SimpleNamespace(
-        outcome=lambda h, offsets: outcomes[h],
-        arm_of=lambda h: SimpleNamespace(lowered=lowered),
-        job=SimpleNamespace(task=SimpleNamespace(goals=[SimpleNamespace(body_frame="head")] * 3)),
+        outcome=lambda h, offsets: HandScores(outcomes[h], np.zeros((4, 3), np.uint8)),
+        hands=[SimpleNamespace(lowered=lowered)],
+        task=SimpleNamespace(goals=[SimpleNamespace(body_frame="head")] * 3),
     )
     evaluation = SimpleNamespace(
         reached=best, sets=np.array([[0, 1]]), weights=np.array([0.5, 0.25, 0.25]),
@@ -133,7 +134,7 @@ def test_the_ceiling_ignores_a_gripper_blocked_by_the_robot():
     """Another base pose may free a gripper that touches the robot's own body."""
     trials, evaluation = by_hand()
     nominal = losses(trials, evaluation).ceiling
-    for outcome in (trials.outcome(h, {}) for h in (0, 1)):
+    for outcome in (trials.outcome(h, {}).scores for h in (0, 1)):
         blocked = outcome.reason[0] == Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT
         outcome.reason[0, blocked] = Reason.GRIPPER_BLOCKED_BY_ROBOT
     # In sample 0 another base pose may reach goal 1, in sample 2 none can.
@@ -146,7 +147,7 @@ def test_the_ceiling_ignores_a_gripper_blocked_by_the_robot():
         Reason.GRIPPER_BLOCKED_BY_ROBOT,
     }
     for member in (0, 1):
-        reason = trials.outcome(member, {}).reason
+        reason = trials.outcome(member, {}).scores.reason
         reason[reason == Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT] = Reason.GRIPPER_BLOCKED_BY_ROBOT
     assert losses(trials, evaluation).ceiling == 1.0
 

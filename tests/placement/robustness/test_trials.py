@@ -35,7 +35,7 @@ from tcs.placement.robustness.body_collisions import (
     counted_rests,
 )
 from tcs.placement.scoring.drake_check import CLEARANCE_ROUNDING, POSITION_BAR, ROTATION_BAR
-from tcs.placement.tables import Points, Reason
+from tcs.placement.tables import Reason
 from tests.kernel.judge import is_true
 
 
@@ -116,9 +116,9 @@ def test_results_do_not_depend_on_threads_or_batches(trials, rng, monkeypatch):
 def test_the_first_solution_gives_the_reasons_that_the_best_gives(trials, rng):
     members, offsets = some(rng, trials, 12), trials.errors.draw(20, 0)
     at = trials.grid.values(members)
-    points = Points(np.stack([*at.values()], axis=1), np.zeros(len(members), dtype=np.int64))
+    points = np.stack([*at.values()], axis=1)
     found = PerturbedPoints(trials, offsets, 1).reasons(points)
-    best = np.array([trials.outcome(int(member), offsets).reason for member in members])
+    best = np.array([trials.outcome(int(member), offsets).scores.reason for member in members])
     assert np.array_equal(found, best)
     assert np.unique(best).size > 2
     reached = trials.reached(members, offsets, jobs=1)
@@ -209,7 +209,7 @@ def test_the_reference_confirms_solutions_in_perturbed_environments(trials, rng)
                 name: believed.get(name, 0.0) + (offsets[name][sample] if name in offsets else 0.0)
                 for name in {**offsets, **believed}
             }
-            arrays = environment_at(trials.arms[0].lowered, trials.scene, trials.job.task, [state])
+            arrays = environment_at(trials.hands[0].lowered, trials.scene, trials.job.task, [state])
             only = slice(level, level + 1)
             arrays = arrays._replace(
                 arm_base_R=arrays.arm_base_R[only],
@@ -256,8 +256,8 @@ def test_a_joint_beyond_its_limit_by_rounding_is_not_moved(bed_trials):
     limits = (believed + 1e-12, believed + 1.0)
     joints = SimpleNamespace(limits=lambda name: limits, default=lambda name: 0.0)
     scene = SimpleNamespace(built=SimpleNamespace(environment_joints=joints))
-    (arm,) = bed_trials.arms
-    found = dataclasses.replace(bed_trials, arms=(dataclasses.replace(arm, scene=scene),))
+    (arm,) = bed_trials.hands
+    found = dataclasses.replace(bed_trials, hands=(dataclasses.replace(arm, scene=scene),))
     positions, stopped = found.positions(0, {"head_rest": np.array([0.0, 0.5, -0.5, 2.0])})
     assert positions["head_rest"].tolist() == [believed, believed + 0.5, believed, limits[1]]
     assert stopped.tolist() == [False, False, True, True]
@@ -280,7 +280,7 @@ def test_a_file_of_other_models_is_refused(bed_file):
 
 
 def test_body_collisions_decide_by_base_and_person(chair_file, chair_trials):
-    lowered = chair_trials.arms[0].lowered
+    lowered = chair_trials.hands[0].lowered
     arrays = lowered.arrays
     checked = {
         choice: counted_pairs(chair_trials.scene, lowered, choice) for choice in BODY_COLLISIONS

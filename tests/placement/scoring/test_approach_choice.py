@@ -97,7 +97,7 @@ def test_the_arm_of_a_scene_stays_where_it_is(corner):
 def test_a_dry_run_scores_approaches_too(by_default, corner):
     job = load_job("shaving", corner, "pr2")
     sizes = [
-        estimate(job, measure="isotropy", jobs=1, approach=approach).memory_bytes
+        estimate([job], measure="isotropy", jobs=1, approach=approach).memory_bytes
         for approach in (None, False)
     ]
     postures = summary(by_default)["approach"]

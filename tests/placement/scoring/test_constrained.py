@@ -17,7 +17,7 @@ from tcs.placement.constraints import (
     excluded_configurations,
     scored_constraints,
 )
-from tcs.placement.scoring import rebuild_scene, sweep
+from tcs.placement.scoring import rebuild_scenes, sweep
 from tcs.placement.tables import Reason
 from tcs.placement.tables.place_map import PlaceMap
 from tests.placement.tables.small import small_grid
@@ -122,7 +122,7 @@ def test_a_box_is_an_obstacle_of_the_environment(blocked, small_environment, tmp
 
 
 def test_the_scene_of_the_file_has_the_box(blocked):
-    _, scene, _ = rebuild_scene(blocked)
+    _, scene, _ = rebuild_scenes(blocked)[0]
     # The base in the box: Drake finds the contact.
     scene.place_base(BOX.x, BOX.y, 0.0)
     assert any("blocked_1" in pair[:2] for pair in scene.violations())
@@ -146,7 +146,7 @@ def test_an_axis_to_keep_has_one_value(small_environment):
     torso = Grid.from_dict(file.grid).axis("torso")
     assert (torso.count, torso.start) == (1, 0.15)
     assert constraint_texts(file) == ["only torso = 0.15 m"]
-    assert rebuild_scene(file)[0].grid == Grid.from_dict(file.grid)
+    assert rebuild_scenes(file)[0][0].grid == Grid.from_dict(file.grid)
     with pytest.raises(SelectionError, match=r"keep torso: the current state lacks its value"):
         tcs.score("shaving", small_environment, constraints=keep)
     with pytest.raises(UnknownNameError, match=r"present values: .*'tors'.*Did you mean 'torso'"):

@@ -4,14 +4,17 @@ import numpy as np
 import pytest
 import yaml
 
-from tcs.errors import RobotError, SelectionError, StoreError, TaskError, UnknownNameError
+from tcs.errors import RobotError, StoreError, TaskError, UnknownNameError
 from tcs.model.grid import InitialConfiguration
 from tcs.model.tasks import load_task
 from tcs.output.words import goal_names
 from tcs.placement.constraints import Constraints, Obstacle
 from tcs.placement.reasons import explain
-from tcs.placement.scoring import load_job, rebuild_scene, rebuild_scenes, score, summary, verify
-from tcs.placement.selection import select
+from tcs.placement.refinement.points import PointScorer
+from tcs.placement.robustness import Trials
+from tcs.placement.scoring import load_job, rebuild_scenes, score, summary, verify
+from tcs.placement.selection import SelectionTables, select
+from tcs.placement.selection.admission import admitted_candidates
 from tcs.placement.store import HANDS, load_scores, save_scores
 from tcs.placement.tables import Reason
 from tests.environments import CORNER, write_environment
@@ -103,16 +106,43 @@ def test_answers_name_the_hand(hands):
     assert found.distribution.reasons[Reason.REACHED] == reached
 
 
-def test_what_needs_one_hand_refuses_several(hands, corner, tmp_path):
-    with pytest.raises(SelectionError, match="goals of one hand, but those of 'hands' name 3"):
-        rebuild_scene(hands)
-    with pytest.raises(TaskError, match="name 3: left arm with blade; right arm with spoon; bare"):
+def test_obstacles_block_the_solutions_of_each_hand(hands, corner, tmp_path):
+    with pytest.raises(TaskError, match="of 3: left arm with blade; right arm with spoon; bare"):
         load_job(write_task(tmp_path, GOALS), corner, "pr2")
-    table = Obstacle.parse("1 0 0.5 0.5 0 0 0.7")
-    with pytest.raises(SelectionError, match="checked for one hand"):
-        select(hands, HERE, constraints=Constraints(blocked=(table,)))
-    with pytest.raises(TaskError, match="so not every arm is scored at every goal"):
-        score(write_task(tmp_path, GOALS), corner, "pr2", arms="both")
+    sets = hands.nominal.sets
+    box = Obstacle.parse("0.75 -0.45 0.2 0.2 0 0.9 1.2")
+    found = admitted_candidates(Constraints(blocked=(box,)), HERE, SelectionTables.of(hands))
+    assert not np.array_equal(found.reached, sets.reached)
+    for numbers in hands.goals_of_hands:
+        goals = [{k: v for k, v in GOALS[g].items()} for g in numbers]
+        alone = score(write_task(tmp_path, goals), corner, "pr2", approach=False)
+        of_hand = admitted_candidates(Constraints(blocked=(box,)), HERE, SelectionTables.of(alone))
+        rows = np.searchsorted(sets.candidates, alone.nominal.sets.candidates)
+        np.testing.assert_array_equal(found.reached[np.ix_(rows, numbers)], of_hand.reached)
+
+
+def test_goals_without_an_arm_are_reached_by_any(corner, tmp_path):
+    task = write_task(tmp_path, GOALS)
+    named, any_arm = (
+        score(task, corner, "pr2", arms=arms, approach=False) for arms in (None, "both")
+    )
+    assert any_arm.hand_names == ("left+blade", "right+spoon", "left", "right")
+    ours, theirs = any_arm.nominal.scores, named.nominal.scores
+    np.testing.assert_array_equal(ours.reached[:, [0, 1, 3]], theirs.reached[:, [0, 1, 3]])
+    assert np.all(ours.reached[:, 2] >= theirs.reached[:, 2])
+    assert np.count_nonzero(ours.reached[:, 2]) > np.count_nonzero(theirs.reached[:, 2])
+
+
+def test_every_consumer_takes_several_hands(hands):
+    points = PointScorer.of(hands, 0)
+    grid, scores = hands.configurations, hands.nominal.scores
+    at = grid.values(np.arange(grid.size))
+    found = points.score(np.stack([at[axis.name] for axis in grid.axes], axis=1))
+    np.testing.assert_array_equal(found.reached, scores.reached)
+    np.testing.assert_array_equal(found.hand[found.reached], scores.hand[found.reached])
+    members = hands.nominal.sets.candidates
+    reached = Trials.of(hands).reached(members, {"person_x": np.zeros(1)})
+    np.testing.assert_array_equal(reached[:, 0], scores.reached[members])
 
 
 def test_goals_of_one_hand_are_scored_as_with_that_robot(corner, tmp_path):
@@ -121,11 +151,10 @@ def test_goals_of_one_hand_are_scored_as_with_that_robot(corner, tmp_path):
     assert not file.hands
     assert file.robot["name"] == "pr2_right+spoon"
     assert file.metadata["robot"] == "pr2"
-    job, *_ = rebuild_scene(file)
+    job, *_ = rebuild_scenes(file)[0]
     assert job.spec.robot.tool_frame == "spoon_tip"
     assert len(rebuild_scenes(file)) == 1
-    with pytest.raises(TaskError, match="name their hands"):
-        score(task, corner, "pr2", arms="both")
+    assert score(task, corner, "pr2", arms="both", approach=False).robot == file.robot
 
 
 def test_contact_is_allowed_to_the_tool_that_a_goal_needs(corner, tmp_path):
@@ -167,6 +196,6 @@ def test_a_tool_file_is_found_beside_the_task(tmp_path):
 
 def test_hands_of_a_file_are_checked(hands):
     entries = [dict(entry) for entry in hands.hands]
-    entries[0]["goals"] = [0, 2]
-    with pytest.raises(StoreError, match="must divide the goals among hands"):
+    entries[1]["goals"] = [1]
+    with pytest.raises(StoreError, match="must give every goal to hands"):
         dataclasses.replace(hands, metadata={**hands.metadata, HANDS: entries})

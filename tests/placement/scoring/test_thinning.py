@@ -39,10 +39,9 @@ def thinned(scores, grid, **options):
     min_distance=st.sampled_from([0.0, 0.05, 0.2, 0.4]),
     bed=st.sampled_from([0, 2]),
     same_environment=st.booleans(),
-    arms=st.sampled_from([(), ("left", "right")]),
 )
-def test_the_best_set_is_that_of_all_sets(table, step, min_distance, bed, same_environment, arms):
-    grid = small_grid(step=step, bed=bed, arms=arms)
+def test_the_best_set_is_that_of_all_sets(table, step, min_distance, bed, same_environment):
+    grid = small_grid(step=step, bed=bed)
     scores = random_scores(grid, **table)
     sets = thinned(scores, grid, min_distance=min_distance, same_environment=same_environment)
     every = all_sets(scores, grid, min_distance, "paper", same_environment)

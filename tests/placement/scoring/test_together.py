@@ -9,6 +9,8 @@ from tcs.output.report.score.pictures import scene_figure
 from tcs.output.report.score.shown_set import ShownSet
 from tcs.output.words import goal_names
 from tcs.placement.reasons import explain
+from tcs.placement.refinement.points import PointScorer
+from tcs.placement.robustness import Trials
 from tcs.placement.scoring import score, verify
 from tcs.placement.scoring.file_checker import FileChecker, Posture
 from tcs.placement.store import load_scores, save_scores
@@ -69,19 +71,32 @@ def test_drake_refuses_arms_that_touch(pair):
     checker = FileChecker.of(pair, jobs=1)
     h = int(np.flatnonzero(pair.nominal.scores.reached[:, 0])[0])
     value, q, other = checker.dexterity(h, 0), checker.joints(h, 0), checker.joints(h, 1)
-    assert checker.check(h, 0, Posture(value, q, other)).is_true
+    assert checker.check(h, 0, Posture(0, value, q, other)).is_true
     # The right forearm swings into the left one.
     swung = other + np.array([1.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    finding = checker.check(h, 0, Posture(value, q, swung))
+    finding = checker.check(h, 0, Posture(0, value, q, swung))
     assert not finding.is_true
     # Each arm meets the other where that is now, not where it is parked.
     contacts = 0
     for goal, joints, of_other in ((0, q, swung), (1, swung, q)):
-        part, scored, number = checker.scored(h, goal)
-        checker.drakes[part].pose_other_arm(of_other)
-        contacts += checker.drakes[part].check(scored, number, joints, value).contacts
+        hand = checker.hand(h, goal)
+        checker.drakes[hand].pose_other_arm(of_other)
+        number = checker.goals[hand].index(goal)
+        contacts += checker.drakes[hand].check(h, number, joints, value).contacts
     assert finding.contacts == contacts > 0
-    assert not checker.check(h, 0, Posture(value + 0.01, q, other)).dexterity_error < 0.009
+    assert not checker.check(h, 0, Posture(0, value + 0.01, q, other)).dexterity_error < 0.009
+
+
+def test_both_arms_are_checked_against_each_other_off_the_grid_and_under_error(pair):
+    grid, scores = pair.configurations, pair.nominal.scores
+    at = grid.values(np.arange(grid.size))
+    found = PointScorer.of(pair, 0).score(np.stack([at[axis.name] for axis in grid.axes], axis=1))
+    np.testing.assert_array_equal(found.reached, scores.reached)
+    np.testing.assert_array_equal(found.dexterity, scores.dexterity)
+    members = np.flatnonzero((scores.reason != Reason.BODY_BLOCKED).all(axis=1))
+    reached = Trials.of(pair).reached(members, {"person_x": np.zeros(1)})
+    np.testing.assert_array_equal(reached[:, 0], scores.reached[members])
+    assert np.any(scores.reason[members] == Reason.OTHER_GOAL_UNREACHED)
 
 
 def test_names_and_sides_of_a_pair_do_not_matter(pair, beside, tmp_path):

@@ -138,14 +138,15 @@ def test_obstacles_and_regions_equal_filtering_all_kept_sets(most):
     scores = random_scores(GRID, 6, seed=4, share=0.2)
     sets = build_sets(scores, GRID, max_members=most)
     robot = made_up_robot()
-    tables = SelectionTables(sets, GRID, None, lambda: robot, lambda: scores)
+    tables = SelectionTables(sets, GRID, None, lambda _: robot, lambda: scores)
+    (postures,) = tables.postures
     region = Region.parse("-1 0.3, -0.5 0.3, -0.5 0.9, -1 0.9")
     obstacle = Obstacle.parse("0.1 0.4 0.2 0.1 20 0.5 0.8")
     constraints = Constraints(forbid=(region,), blocked=(obstacle,))
-    base = np.stack([tables.postures.base[:, i] for i in range(3)], axis=1)
-    stands = Footprint.of(robot).overlaps(region, base) | blocked_bodies(obstacle, tables.postures)
-    hit = blocked_solutions(obstacle, tables.postures, ~stands)
-    candidate, goal = tables.postures.pairs
+    base = np.stack([postures.base[:, i] for i in range(3)], axis=1)
+    stands = Footprint.of(robot).overlaps(region, base) | blocked_bodies(obstacle, postures)
+    hit = blocked_solutions(obstacle, postures, ~stands)
+    candidate, goal = postures.pairs
     blocked = {
         (int(sets.candidates[c]), int(g)) for c, g in zip(candidate[hit], goal[hit], strict=True)
     }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 import math
 
@@ -12,8 +11,8 @@ from tcs.model.grid import Grid
 from tcs.placement.tables import Reason, ScoreTable
 
 
-def small_grid(nx=4, ny=3, yaws=2, torsos=2, *, step=0.2, bed=0, head=0, arms=()):
-    """Return a grid of base positions `step` apart, optionally with bed, head rest and arms."""
+def small_grid(nx=4, ny=3, yaws=2, torsos=2, *, step=0.2, bed=0, head=0):
+    """Return a grid of base positions `step` apart, optionally with bed and head rest."""
     spec = {}
     if bed:
         spec["bed_height"] = {"unit": "m", "start": 0.0, "step": 0.1, "count": bed}
@@ -25,7 +24,7 @@ def small_grid(nx=4, ny=3, yaws=2, torsos=2, *, step=0.2, bed=0, head=0, arms=()
         "base_yaw": {"unit": "deg", "start": 0.0, "step": 360.0 / max(yaws, 1), "count": yaws},
         "torso": {"unit": "m", "start": 0.0, "step": 0.15, "count": torsos},
     }
-    return dataclasses.replace(Grid.from_spec(spec), arms=arms)
+    return Grid.from_spec(spec)
 
 
 def random_scores(grid, goals, seed, *, levels=0, share=0.5):

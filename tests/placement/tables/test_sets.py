@@ -17,7 +17,6 @@ def parts():
         "min_distance": 0.4,
         "same_environment": False,
         "state_size": 5,
-        "arm_size": 10,
         "weights": np.array([0.5, 0.5]),
         "candidates": np.array([4, 5, 7], dtype=np.int32),
         "reached": np.array([[True, False], [True, False], [False, True]]),

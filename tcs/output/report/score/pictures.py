@@ -31,19 +31,14 @@ from tcs.output.report.score.scene_solids import (
     goal_solids,
     robot_solids,
 )
-from tcs.output.report.score.scored_scenes import (
-    ScoredScene,
-    scene_of_base,
-    scored_hands,
-    scored_scene,
-)
+from tcs.output.report.score.scored_scenes import ScoredScene, scored_scenes
 from tcs.output.report.score.shown_set import ShownSet
 from tcs.output.words import (
-    arm_text,
     assign_goals,
     assigned_goals,
     goal_text,
     goals_text,
+    hands_text,
     place_in_line,
 )
 from tcs.placement.scoring import Job
@@ -53,18 +48,21 @@ _AROUND_A_GOAL = primitive_corners(BOX, (0.3, 0.3, 0.3))
 """Corners of the region shown around the tool [m]: the gripper and the nearby part of the body."""
 
 
-def map_figure(file: ScoreFile, shown: ShownSet, scored: ScoredScene | None = None) -> Figure:
+def map_figure(
+    file: ScoreFile, shown: ShownSet, scored: Sequence[ScoredScene] | None = None
+) -> Figure:
     """Return the map of a score file.
 
     Args:
         file: A score file.
         shown: The set to mark.
-        scored: The result of `scored_scene`, built if None. The function moves the scene.
+        scored: The result of `scored_scenes`, built if None. The function moves the scenes.
 
     Raises:
         StoreMismatchError: If the models are not those the file was made from.
     """
-    job, scene = scored or scene_of_base(file, shown)
+    # The base is the same with all hands.
+    job, scene = (scored or scored_scenes(file, shown))[0]
     base = base_outline(scene)
     if shown.members:
         _set_environment(scene, shown.members[0])
@@ -118,22 +116,14 @@ def scene_figure(file: ScoreFile, shown: ShownSet) -> Figure:
             "nothing to draw: no initial configuration reaches a goal. `tcs map` shows where the "
             "base can be placed."
         )
-    if file.hands:
-        hands = scored_hands(file, shown)
-        of_members = [hands] * len(shown.members)
-    else:
-        of_arms = {
-            arm: (scored_scene(file, shown, arm=arm),)
-            for arm in dict.fromkeys(member.arm for member in shown.members)
-        }
-        of_members = [of_arms[member.arm] for member in shown.members]
-    panels = [_member_panel(file, scenes, shown, i) for i, scenes in enumerate(of_members)]
-    title = title_of(of_members[0][0].job, file)
+    hands = scored_scenes(file, shown)
+    panels = [_member_panel(file, hands, shown, i) for i in range(len(shown.members))]
+    title = title_of(hands[0].job, file)
     return draw_scene(panels, title=f"{title}\n{shown.subtitle}")
 
 
 def member_figure(
-    file: ScoreFile, shown: ShownSet, number: int, scored: ScoredScene | None = None
+    file: ScoreFile, shown: ShownSet, number: int, scored: Sequence[ScoredScene] | None = None
 ) -> Figure:
     """Return two pictures of the robot at one member of the set: the whole robot, and its tool.
 
@@ -141,23 +131,19 @@ def member_figure(
         file: A score file.
         shown: The set.
         number: Number of the member, from 0.
-        scored: The result of `scored_scene`, built if None. The function moves the scene.
+        scored: The result of `scored_scenes`, built if None. The function moves the scenes.
 
     Raises:
         StoreMismatchError: If the models are not those the file was made from.
     """
-    scored = scored or scored_scene(file, shown)
-    panels = [_member_panel(file, (scored,), shown, number, is_close=it) for it in (False, True)]
+    scored = scored or scored_scenes(file, shown)
+    panels = [_member_panel(file, scored, shown, number, is_close=it) for it in (False, True)]
     return draw_scene(panels, title="")
 
 
 def title_of(job: Job, file: ScoreFile) -> str:
-    """Return the titles of task, environment and robot, with the arms of a file of several."""
-    if file.hands:
-        return job_title(job, str(file.robot["name"]))
-    if file.arms:
-        return job_title(job, f"{file.robot['name']}, {' or '.join(file.arms)} arm")
-    return job_title(job)
+    """Return the titles of task, environment and robot."""
+    return job_title(job, str(file.robot["name"]) if file.hands else None)
 
 
 def job_title(job: Job, robot: str | None = None) -> str:
@@ -181,14 +167,14 @@ def _member_panel(
 ) -> ScenePanel:
     """Return the panel of one member: robot and person, or a close view of the tool at its goal.
 
-    The robot has the hand that the goal names, of a file of several.
+    The robot has the hand that serves the goal.
     """
     member, h = shown.members[number], shown.rows[number]
     scores, names = shown.scores, shown.goal_names
     served = assigned_goals(assign_goals(scores, shown.rows), number)
     current = max(served, key=lambda g: float(scores.dexterity[h, g]), default=None)
-    named = file.hand_of_goal[current][0] if file.hands and current is not None else 0
-    job, scene = hands[named]
+    by_hand = np.zeros(scores.goals, np.uint8) if scores.hand is None else scores.hand[h]
+    job, scene = hands[0 if current is None else int(by_hand[current])]
     _set_environment(scene, member)
     scene.place_base(member.base_x, member.base_y, member.base_yaw)
     scene.set_torso(member.torso)
@@ -221,9 +207,9 @@ def _member_panel(
         # Furniture may extend beyond the picture; robot, person and goals may not.
         whole = [solid.corners for solid in solids if solid.category is not Category.FURNITURE]
         subject, angles_deg = np.concatenate(whole), [70.0, -70.0]
-        arm = f", {arm_text(member.arm)}" if member.arm else ""
+        used = hands_text([file.hand_names[by_hand[goal]] for goal in served] if file.hands else [])
         where = place_in_line(shown.places[number])
-        caption = f"stop {number + 1}{arm}{f': {where}' if where else ''}\n"
+        caption = f"stop {number + 1}{f', {used}' if used else ''}{f': {where}' if where else ''}\n"
         caption += f"serves {goals_text(served, names) if served else 'no goal'}"
         if shown_goals:
             caption += f"; arm{'s' * (len(shown_goals) - 1)} at {goals_text(shown_goals, names)}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,7 +14,7 @@ from tcs.model.grid import InitialConfiguration
 from tcs.motion import plan
 from tcs.output.draw import as_png
 from tcs.output.report.score.pictures import map_figure, member_figure
-from tcs.output.report.score.scored_scenes import ScoredScene, scored_scene
+from tcs.output.report.score.scored_scenes import ScoredScene, scored_scenes
 from tcs.output.report.score.shown_set import ShownSet
 from tcs.output.report.score.states import has_states, states_figure
 from tcs.output.report.score.tours import Tours
@@ -216,7 +216,7 @@ def make_score_report(
     begun, sizes = time.perf_counter(), sizes or CheckSizes()
     file = load_scores(path)
     shown = ShownSet.of(file, here, max_members, observed, refined=refined)
-    scored = scored_scene(file, shown)
+    scored = scored_scenes(file, shown)
     served = {
         goal: shown.rows[number]
         for goal, number in enumerate(assign_goals(shown.scores, shown.rows))
@@ -233,7 +233,7 @@ def make_score_report(
         path=path,
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
         file=file,
-        job=scored.job,
+        job=scored[0].job,
         shown=shown,
         max_members=max_members,
         verification=verify(
@@ -254,11 +254,13 @@ def make_score_report(
     )
 
 
-def _tours(file: ScoreFile, shown: ShownSet, scored: ScoredScene) -> Tours:
+def _tours(file: ScoreFile, shown: ShownSet, scored: Sequence[ScoredScene]) -> Tours:
     """Plan the motions of a set, and measure their clearances."""
-    first = shown.table * scored.job.grid.size
+    first = shown.table * scored[0].job.grid.size
     planned = plan(file, shown.refined or [first + index for index in shown.indices])
-    before = scored.scene.positions()
-    tours = Tours.of(planned, scored.scene)
-    scored.scene.restore(before)
+    before = [scene.positions() for _, scene in scored]
+    names = file.hand_names or ("",)
+    tours = Tours.of(planned, {name: scene for name, (_, scene) in zip(names, scored, strict=True)})
+    for (_, scene), positions in zip(scored, before, strict=True):
+        scene.restore(positions)
     return tours

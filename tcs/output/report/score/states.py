@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
@@ -16,7 +17,7 @@ from tcs.output.report.score.pictures import (
     title_of,
 )
 from tcs.output.report.score.scene_solids import base_outline, environment_solids
-from tcs.output.report.score.scored_scenes import ScoredScene, scene_of_base
+from tcs.output.report.score.scored_scenes import ScoredScene, scored_scenes
 from tcs.output.report.score.shown_set import ShownSet
 from tcs.output.words import axis_name, quantity
 from tcs.placement.store import ScoreFile
@@ -34,7 +35,7 @@ def states_figure(
     file: ScoreFile,
     shown: ShownSet,
     score: Score = "reachability",
-    scored: ScoredScene | None = None,
+    scored: Sequence[ScoredScene] | None = None,
 ) -> Figure:
     """Return the maps of all states of the environment, in rows and columns, with one scale.
 
@@ -45,7 +46,7 @@ def states_figure(
         file: A score file.
         shown: The set to mark, each member in the panel of its environment state.
         score: The score that colours the base positions.
-        scored: The result of `scored_scene`, built if None. The function moves the scene.
+        scored: The result of `scored_scenes`, built if None. The function moves the scenes.
 
     Raises:
         SelectionError: If the environment has one state only, or too many to draw.
@@ -64,7 +65,7 @@ def states_figure(
             f"the environment has {states} states, but at most {MOST_PANELS} can be drawn on one "
             "page. Draw the map without --states."
         )
-    job, scene = scored or scene_of_base(file, shown)
+    job, scene = (scored or scored_scenes(file, shown))[0]
     base = base_outline(scene)
     scores = file.tables[shown.table].scores
     stands = base_footprints(shown, base)

@@ -33,14 +33,14 @@ class Tours:
     the two bodies; None beyond FARTHEST."""
 
     @classmethod
-    def of(cls, plan: MotionPlan, scene: Scene) -> Tours:
+    def of(cls, plan: MotionPlan, scenes: Mapping[str, Scene]) -> Tours:
         """Measure the clearances of a plan with Drake.
 
         Args:
             plan: The plan.
-            scene: Its scene, in the observed state; the rest is set.
+            scenes: The scene of each hand, in the observed state; the rest is set.
         """
-        return cls(plan, tuple(_clearances(stop, scene) for stop in plan.stops))
+        return cls(plan, tuple(_clearances(stop, scenes[stop.hand]) for stop in plan.stops))
 
     def to_json(self) -> dict[str, Any]:
         """Return a summary as plain containers."""
