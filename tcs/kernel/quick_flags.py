@@ -20,7 +20,8 @@ def quicken_flags() -> bool:
     It is left if this version of numba hashes the values of flags, not their names alone.
     """
     some, others = Flags(), Flags()
-    others.nrt = not others.nrt
+    # Options are descriptors, of which the types know nothing.
+    others.nrt = not others.nrt  # type: ignore[misc, assignment]
     if hash(some) != hash(others) or some == others:
         return False
     slow_hash, slow_equal = TargetConfig.__hash__, TargetConfig.__eq__
