@@ -118,7 +118,7 @@ def reasons_at(problem: Problem, rows: Rows) -> tuple[NDArray[np.uint8], float]:
     Returns:
         Codes of reasons, shape (n, goals), and the processor time [s].
     """
-    scores, begun = new_scores(rows.state.size, problem.goal_p.shape[1]), time.process_time()
+    scores, begun = new_scores(rows.state.size, problem.goals), time.process_time()
     score_rows(problem, gripper_contacts(problem), rows, scores)
     return scores.reason, time.process_time() - begun
 

@@ -101,6 +101,18 @@ NO_DISTANCES = BodyDistances(
 )
 
 
+def goals_of(first_pose: IntArray, goal_p: FloatArray) -> int:
+    """Return the number of goals, from `first_pose` and `goal_p` of a scene or a problem."""
+    return len(first_pose) - 1 if len(first_pose) else goal_p.shape[1]
+
+
+def poses_of(first_pose: IntArray, goal: int) -> range:
+    """Return the numbers of the poses of a goal, from `first_pose` of a scene or a problem."""
+    if not len(first_pose):
+        return range(goal, goal + 1)
+    return range(int(first_pose[goal]), int(first_pose[goal + 1]))
+
+
 class SceneArrays(NamedTuple):
     """Everything needed to score any initial configuration of one scene against its goals.
 
@@ -133,18 +145,35 @@ class SceneArrays(NamedTuple):
     self_margin: float
     """Least clearance [m] between two shapes of the robot."""
     goal_R: FloatArray
-    """Goal orientations in W, shape (environment states, goals, 3, 3)."""
+    """Orientations of the goals' poses in W, shape (environment states, poses, 3, 3)."""
     goal_p: FloatArray
-    """Goal positions in W [m], shape (environment states, goals, 3)."""
+    """Positions of the goals' poses in W [m], shape (environment states, poses, 3)."""
     freedom: FloatArray = np.empty((0, 9))
-    """What is free about each goal, in the columns of `tcs.kernel.freedom.forms`, shape
-    (goals, 9); no rows if every goal is a single pose."""
+    """What is free about each pose, in the columns of `tcs.kernel.freedom.forms`, shape
+    (poses, 9); no rows if nothing is free."""
+    first_pose: IntArray = np.empty(0, np.int64)
+    """First pose of each goal, which any of its poses reaches, and their number, shape
+    (goals + 1,); empty if each goal is one pose."""
     distances: BodyDistances = NO_DISTANCES
     """Tables of distances of bodies of the robot."""
     rest: FloatArray = np.empty((0, 7))
     """Rest postures of the arm [rad], in the order in which they are tried, shape (n, 7). Where the
     arm touches the environment in all of them, so does the robot's body; without one, it is not
     checked."""
+
+    @property
+    def goals(self) -> int:
+        """Number of goals."""
+        return goals_of(self.first_pose, self.goal_p)
+
+    def poses_of(self, goal: int) -> range:
+        """Return the numbers of the poses of a goal."""
+        return poses_of(self.first_pose, goal)
+
+    def is_single_pose(self, goal: int) -> bool:
+        """Return whether a goal is one pose, about which nothing is free."""
+        poses = list(self.poses_of(goal))
+        return len(poses) == 1 and not (len(self.freedom) and np.any(self.freedom[poses[0]]))
 
 
 class GridArrays(NamedTuple):

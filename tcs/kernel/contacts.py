@@ -195,6 +195,8 @@ def arm_contact(problem: Problem, work: Workspace, body_A: FloatArray, q: FloatA
         place_coupled_links(problem, work, q)
     partner, i, j = last[0], last[1], last[2]
     if partner >= 0 and pair_touches(problem, work, body_A, q, partner, i, j):
+        if partner == ARM and problem.link_frame[j] == 7:
+            work.met_gripper[0] = True
         return pair_code(problem, partner, i, j)
     for g in range(problem.gripper_groups, groups):
         box, body = boxes + g, link_body[first[g]]
@@ -228,6 +230,8 @@ def arm_contact(problem: Problem, work: Workspace, body_A: FloatArray, q: FloatA
                 and arm_touches(problem, work, g, h)
             ):
                 last[0], last[1], last[2] = ARM, touching[0], touching[1]
+                if h < problem.gripper_groups:
+                    work.met_gripper[0] = True
                 return pair_code(problem, ARM, last[1], last[2])
     return NO_CONTACT
 

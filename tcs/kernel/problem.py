@@ -15,6 +15,8 @@ from tcs.kernel.arrays import (
     IntArray,
     SceneArrays,
     Shapes,
+    goals_of,
+    poses_of,
 )
 from tcs.kernel.collide import BOUND, CENTRE, pack
 from tcs.kernel.dexterity import DEFAULT_MEASURE, Dexterity, dexterity
@@ -103,11 +105,14 @@ class Problem(NamedTuple):
     arm_radius: float
     """Distance from the origin of A beyond which nothing touches the arm [m]."""
     goal_R: FloatArray
-    """Goal orientations in W, shape (environment states, goals, 3, 3)."""
+    """Orientations of the goals' poses in W, shape (environment states, poses, 3, 3)."""
     goal_p: FloatArray
-    """Goal positions in W [m], shape (environment states, goals, 3)."""
+    """Positions of the goals' poses in W [m], shape (environment states, poses, 3)."""
+    first_pose: IntArray
+    """First pose of each goal, which any of its poses reaches, and their number, shape
+    (goals + 1,); empty if each goal is one pose."""
     freedom: FreeGoals
-    """What is free about the goals, which are their nominal poses."""
+    """What is free about the poses, which are nominal ones."""
     turn: FloatArray
     """Unit axis in T about which all goals leave the tool free to rotate, if an arm of five joints
     depends on it, else zeros, shape (3,)."""
@@ -118,6 +123,15 @@ class Problem(NamedTuple):
     (torso levels, postures, arm rows, 17)."""
     rest_spheres: FloatArray
     """The bounding sphere of each, as a packed shape in B, shape (torso levels, postures, 17)."""
+
+    @property
+    def goals(self) -> int:
+        """Number of goals."""
+        return goals_of(self.first_pose, self.goal_p)
+
+    def poses_of(self, goal: int) -> range:
+        """Return the numbers of the poses of a goal."""
+        return poses_of(self.first_pose, goal)
 
 
 def build_problem(scene: SceneArrays, measure: str = DEFAULT_MEASURE) -> Problem:
@@ -191,7 +205,8 @@ def build_problem(scene: SceneArrays, measure: str = DEFAULT_MEASURE) -> Problem
         arm_radius=_arm_radius(scene.chain, links[0], frame) + widest,
         goal_R=_own(scene.goal_R),
         goal_p=_own(scene.goal_p),
-        freedom=free_goals(scene.freedom, scene.chain),
+        first_pose=np.array(scene.first_pose, dtype=np.int64),
+        freedom=free_goals(scene.freedom, scene.chain, dexterity(measure)),
         turn=axis_left_free(scene.freedom, scene.chain),
         distances=arranged(scene.distances, robot_bodies),
         rest=rest,

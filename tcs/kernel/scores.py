@@ -8,11 +8,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.kernel.arrays import IntArray
+from tcs.kernel.cache import inner
 
 REACHED, TOO_FAR, JOINT_LIMITS, BODY_BLOCKED = 0, 1, 2, 3
 GRIPPER_BLOCKED_BY_ENVIRONMENT, GRIPPER_BLOCKED_BY_ROBOT, ARM_BLOCKED = 4, 5, 6
 APPROACH_LIMITS, APPROACH_BLOCKED = 8, 9
 """Reasons, equal to the values of `tcs.placement.tables.Reason`."""
+
+
+@inner
+def progress_of(reason: int) -> int:
+    """Return how far a pose came: 0 out of reach, 4 for a contact of the arm, 5 reached."""
+    if reason == REACHED:
+        return 5
+    if reason == ARM_BLOCKED:
+        return 4
+    if reason == JOINT_LIMITS:
+        return 3
+    if reason == GRIPPER_BLOCKED_BY_ROBOT:
+        return 2
+    return 1 if reason == GRIPPER_BLOCKED_BY_ENVIRONMENT else 0
 
 
 JOINTS = 7

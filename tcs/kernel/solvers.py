@@ -96,31 +96,86 @@ def score_pair(
 def quick_look(
     problem: Problem, work: Workspace, body_A: FloatArray, least: float, solver: Solver
 ) -> tuple[int, int]:
-    """Return REACHED if `score_pair` is worth its time at a goal within reach, else a reason.
+    """Score one goal as `score_pair`, unless that is not worth its time.
 
-    An arm with a closed form tries samples of its free joint; for others nothing is quicker than
-    `score_pair`.
+    An arm with a closed form tries samples of its free joint; without a free one among them, the
+    goal does not count as reached.
 
     Args:
         problem: The scene.
         work: Workspace with environment, base, gripper and goal in place.
         body_A: The robot's other shapes in A at the current torso level.
         least: Measure that the solution has to exceed; negative for any.
-        solver: Prepared by `out_of_reach`.
+        solver: Prepared by `out_of_reach`; `best` is filled with the joint angles [rad] of the
+            solution if there is one.
 
     Returns:
         Reason and contact code.
     """
     if isinstance(solver, Search):
         return analytic.quick_look(problem, work, body_A, least, solver)
-    return _worth_it(problem, work, body_A, least, solver)
+    if isinstance(solver, SixJointSolver):
+        return six_joints.quick_look(problem, work, body_A, least, solver)
+    if isinstance(solver, FiveJointSolver):
+        return five_joints.score_pair(problem, work, body_A, solver)
+    return _numeric_look(problem, work, body_A, least, solver)
 
 
 @inner
-def _worth_it(
+def _numeric_look(
+    problem: Problem, work: Workspace, body_A: FloatArray, least: float, solver: NumericSolver
+) -> tuple[int, int]:
+    """Score as `score_pair`, than which nothing is quicker."""
+    return numeric.score_pair(problem, work, body_A, solver)
+
+
+@inner
+def _five_joint_look(
+    problem: Problem, work: Workspace, body_A: FloatArray, least: float, solver: FiveJointSolver
+) -> tuple[int, int]:
+    return five_joints.score_pair(problem, work, body_A, solver)
+
+
+def tilt_to_limits(problem: Problem, work: Workspace, solver: Solver) -> float:
+    """Return an angle by which a goal that fails at joint limits may tilt without being reached.
+
+    Args:
+        problem: The scene.
+        work: Workspace with the goal in place.
+        solver: As `score_pose` left it.
+
+    Returns:
+        The angle [rad], 0 if unknown.
+    """
+    if isinstance(solver, Search):
+        return analytic.tilt_to_limits(problem, work, solver)
+    return _unknown_tilt(problem, work, solver)
+
+
+@inner
+def _unknown_tilt(problem: Problem, work: Workspace, solver: Solver) -> float:
+    return 0.0
+
+
+def look_near(
     problem: Problem, work: Workspace, body_A: FloatArray, least: float, solver: Solver
 ) -> tuple[int, int]:
-    return REACHED, NO_CONTACT
+    """Score one goal as `quick_look`, next to a goal whose solution is known.
+
+    Args:
+        problem: The scene.
+        work: Workspace with environment, base, gripper and goal in place.
+        body_A: The robot's other shapes in A at the current torso level.
+        least: Measure that the solution has to exceed.
+        solver: Prepared by `out_of_reach`; `best` holds the known solution, and is filled with the
+            joint angles [rad] of the new one if there is one.
+
+    Returns:
+        Reason and contact code.
+    """
+    if isinstance(solver, Search):
+        return analytic.look_near(problem, work, body_A, least, solver)
+    return quick_look(problem, work, body_A, least, solver)
 
 
 def score_pose(
@@ -132,6 +187,7 @@ def score_pose(
     R: FloatArray,
     p: FloatArray,
     least: float,
+    near: bool,
     solver: Solver,
 ) -> tuple[int, int]:
     """Score one tool pose of a goal with freedom, the gripper being free of the environment.
@@ -149,14 +205,18 @@ def score_pose(
         p: Tool position in W [m], shape (3,).
         least: Measure that a quick look has to exceed, negative for any; THOROUGH for a pose whose
             solutions are all to be found.
+        near: Whether `solver.best` is the solution of a pose next to this one, from which it is
+            enough to look.
         solver: `best` is filled with the joint angles [rad] of the solution if there is one.
 
     Returns:
         Reason and contact code.
     """
     if isinstance(solver, FiveJointSolver):
-        return five_joints.score_turned(problem, work, body_A, state, torso, R, p, least, solver)
-    return _score_single_pose(problem, work, body_A, state, torso, R, p, least, solver)
+        return five_joints.score_turned(
+            problem, work, body_A, state, torso, R, p, least, near, solver
+        )
+    return _score_single_pose(problem, work, body_A, state, torso, R, p, least, near, solver)
 
 
 @inner
@@ -169,6 +229,7 @@ def _score_single_pose(
     R: FloatArray,
     p: FloatArray,
     least: float,
+    near: bool,
     solver: Solver,
 ) -> tuple[int, int]:
     """Score a tool pose as a goal of its own, see `score_pose`."""
@@ -181,10 +242,10 @@ def _score_single_pose(
         return GRIPPER_BLOCKED_BY_ROBOT, code
     if reason != REACHED:
         return reason, NO_CONTACT
+    if near:
+        return look_near(problem, work, body_A, least, solver)
     if least > THOROUGH:
-        reason, code = quick_look(problem, work, body_A, least, solver)
-        if reason != REACHED:
-            return reason, code
+        return quick_look(problem, work, body_A, least, solver)
     return score_pair(problem, work, body_A, solver)
 
 
@@ -245,12 +306,34 @@ class _ScorePose(_OfSolver):
     entries: ClassVar[dict[Any, Any]] = {}
 
 
+@infer_global(look_near)
+class _LookNear(_OfSolver):
+    implementations: ClassVar[dict[type, Any]] = {
+        Search: analytic.look_near,
+        NumericSolver: _numeric_look,
+        SixJointSolver: six_joints.quick_look,
+        FiveJointSolver: _five_joint_look,
+    }
+    entries: ClassVar[dict[Any, Any]] = {}
+
+
+@infer_global(tilt_to_limits)
+class _TiltToLimits(_OfSolver):
+    implementations: ClassVar[dict[type, Any]] = {
+        Search: analytic.tilt_to_limits,
+        NumericSolver: _unknown_tilt,
+        SixJointSolver: _unknown_tilt,
+        FiveJointSolver: _unknown_tilt,
+    }
+    entries: ClassVar[dict[Any, Any]] = {}
+
+
 @infer_global(quick_look)
 class _QuickLook(_OfSolver):
     implementations: ClassVar[dict[type, Any]] = {
         Search: analytic.quick_look,
-        NumericSolver: _worth_it,
-        SixJointSolver: _worth_it,
-        FiveJointSolver: _worth_it,
+        NumericSolver: _numeric_look,
+        SixJointSolver: six_joints.quick_look,
+        FiveJointSolver: _five_joint_look,
     }
     entries: ClassVar[dict[Any, Any]] = {}

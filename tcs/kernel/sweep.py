@@ -21,10 +21,11 @@ from tcs.kernel.contacts import (
     gripper_environment_contact,
     upper_contact,
 )
+from tcs.kernel.dexterity import ANY
 from tcs.kernel.dexterity.measures import measure_at, rounded_inward
-from tcs.kernel.freedom.forms import FEWEST_JOINTS, pose_of
+from tcs.kernel.freedom.forms import ANGLES, FEWEST_JOINTS, PARAMETERS, pose_of
 from tcs.kernel.freedom.goals import FreeGoals
-from tcs.kernel.freedom.search import score_free
+from tcs.kernel.freedom.search import UNKNOWN, angles_of, score_free, turned_parameters
 from tcs.kernel.problem import Problem
 from tcs.kernel.rows import Rows
 from tcs.kernel.scores import (
@@ -34,6 +35,7 @@ from tcs.kernel.scores import (
     REACHED,
     TOO_FAR,
     Scores,
+    progress_of,
 )
 from tcs.kernel.solvers import Solver, new_solver, out_of_reach, score_pair
 from tcs.kernel.views import unowned
@@ -41,13 +43,14 @@ from tcs.kernel.workspace import Workspace, new_workspace
 
 
 def gripper_contacts(problem: Problem) -> IntArray:
-    """Return the contact codes of the gripper with the environment, shape (states, goals).
+    """Return the contact codes of the gripper with the environment, shape (states, poses).
 
-    With the tool at a goal they are independent of the base pose. If goals are free, there is one
-    code for each of their samples, in the order of `Problem.freedom`: shape (states, samples). Of
-    poses that the arm turns, they are NO_CONTACT: the gripper is checked when the arm is solved.
+    With the tool at a pose they are independent of the base pose. If something is free, there is
+    one code for each sample, in the order of `FreeGoals.codes`: shape (states, codes). Of poses
+    that an arm of five joints turns, they are NO_CONTACT: the gripper is checked when the arm is
+    solved.
     """
-    states, first = len(problem.goal_p), problem.freedom.first
+    states, first = len(problem.goal_p), problem.freedom.codes
     poses = int(first[-1]) if first.size else problem.goal_p.shape[1]
     if problem.joints == FEWEST_JOINTS:
         return np.full((states, poses), NO_CONTACT, np.int64)
@@ -78,39 +81,54 @@ def _gripper_contacts(
 def _sampled_contacts(
     problem: Problem, free: FreeGoals, work: Workspace, s: int, g: int, codes: IntArray
 ) -> None:
-    """Fill the contact codes of the gripper at the samples of a goal."""
-    R, p = np.empty((3, 3)), np.empty(3)
+    """Fill the contact codes of the gripper at the samples of a pose.
+
+    Where the last joint turns the tool, each sample has codes of several angles. The fine ones of
+    the nominal pose are left UNKNOWN unless all others are blocked.
+    """
+    R, p, u = np.empty((3, 3)), np.empty(3), np.empty(PARAMETERS)
+    code, unknown = free.codes[g], False
     for n in range(free.first[g + 1] - free.first[g]):
-        u = free.u[free.start[g] + n]
-        pose_of(free.form[g], u, problem.goal_R[s, g], problem.goal_p[s, g], R, p)
-        codes[s, free.first[g] + n] = gripper_contact_at(problem, work, s, R, p)
+        for angle in range(angles_of(free, g, n)):
+            if angle == ANGLES:
+                for k in range(ANGLES):
+                    unknown = unknown or codes[s, free.codes[g] + k] == NO_CONTACT
+            if angle >= ANGLES and unknown:
+                codes[s, code] = UNKNOWN
+            else:
+                turned_parameters(free.u[free.start[g] + n], angle, u)
+                pose_of(free.form[g], u, problem.goal_R[s, g], problem.goal_p[s, g], R, p)
+                codes[s, code] = gripper_contact_at(problem, work, s, R, p)
+            code += 1
 
 
 def blocked_grippers(problem: Problem) -> BoolArray:
     """Return whether the gripper is in contact at every pose of a goal, shape (states, goals)."""
-    blocked, first = gripper_contacts(problem) != NO_CONTACT, problem.freedom.first
-    if not first.size:
-        return blocked
-    found = np.logical_and.reduceat(blocked, first[:-1], axis=1)
-    _look_further(problem, new_workspace(problem), found)
-    return found
+    found, free = gripper_contacts(problem) != NO_CONTACT, problem.freedom
+    if free.first.size:
+        found = np.logical_and.reduceat(found, free.codes[: len(free.form)], axis=1)
+        _look_further(problem, new_workspace(problem), found)
+    if not problem.first_pose.size:
+        return found
+    return np.logical_and.reduceat(found, problem.first_pose[:-1], axis=1)
 
 
 @jit
 def _look_further(owned_problem: Problem, owned_work: Workspace, blocked: BoolArray) -> None:
     """Keep what is blocked at all samples only where it is at all further poses too, in place."""
     problem, work = unowned(owned_problem), unowned(owned_work)
-    free, R, p = problem.freedom, np.empty((3, 3)), np.empty(3)
+    free, R, p, u = problem.freedom, np.empty((3, 3)), np.empty(3), np.empty(PARAMETERS)
     for s in range(blocked.shape[0]):
         for g in range(blocked.shape[1]):
             start, form = free.start[g], free.form[g]
             samples = free.first[g + 1] - free.first[g]
             for child in range(free.child_first[start], free.child_first[start + samples]):
-                if not blocked[s, g]:
-                    break
-                u = free.u[start + free.children[child]]
-                pose_of(form, u, problem.goal_R[s, g], problem.goal_p[s, g], R, p)
-                blocked[s, g] = gripper_contact_at(problem, work, s, R, p) != NO_CONTACT
+                for angle in range(angles_of(free, g, -1)):
+                    if not blocked[s, g]:
+                        break
+                    turned_parameters(free.u[start + free.children[child]], angle, u)
+                    pose_of(form, u, problem.goal_R[s, g], problem.goal_p[s, g], R, p)
+                    blocked[s, g] = gripper_contact_at(problem, work, s, R, p) != NO_CONTACT
 
 
 def score_rows(problem: Problem, grippers: IntArray, rows: Rows, scores: Scores) -> None:
@@ -140,8 +158,12 @@ def _score_rows(
 ) -> None:
     problem, scores = unowned(owned_problem), unowned(owned_scores)
     work, solver, rows = unowned(owned_work), unowned(owned_solver), unowned(owned_rows)
-    rounded = np.empty(7)
+    rounded, is_placed = np.empty(7), np.zeros(1, np.bool_)
     base_code = NO_CONTACT
+    goals = len(problem.first_pose) - 1
+    are_poses = goals < 0
+    if are_poses:
+        goals = problem.goal_p.shape[1]
     for row in range(len(rows.state)):
         state, torso = rows.state[row], rows.torso[row]
         if row == 0 or not shares_base(rows, row, row - 1):
@@ -154,54 +176,104 @@ def _score_rows(
             scores.reason[row] = BODY_BLOCKED
             scores.contact[row] = code
             continue
-        body_A = problem.body_A[torso]
         # The reported contact must not depend on the configurations scored before.
         work.last[0] = -1
-        environment_placed = False
-        for g in range(problem.goal_p.shape[1]):
-            scores.contact[row, g] = NO_CONTACT
-            if free is not None:
-                if not environment_placed:
-                    environment_in_arm_base(problem, work, torso)
-                    environment_placed = True
-                reason, code = score_free(problem, work, solver, grippers, state, torso, g)
-                scores.reason[row, g], scores.contact[row, g] = reason, code
+        is_placed[0] = False
+        for g in range(goals):
+            first = g if are_poses else problem.first_pose[g]
+            last = g + 1 if are_poses else problem.first_pose[g + 1]
+            farthest = -1
+            for pose in range(first, last):
+                reason, code = _score_at_pose(
+                    problem, free, work, solver, grippers, state, torso, pose, is_placed
+                )
+                came = progress_of(reason)
+                if came > farthest:
+                    scores.reason[row, g], scores.contact[row, g] = reason, code
                 if reason == REACHED:
-                    write_winner(problem, solver.best, rounded, scores, row, g)
-                continue
-            if grippers[state, g] != NO_CONTACT:
-                scores.reason[row, g] = GRIPPER_BLOCKED_BY_ENVIRONMENT
-                scores.contact[row, g] = grippers[state, g]
-                continue
-            goal_in_arm_base(problem, work, state, torso, g)
-            reason = out_of_reach(problem, work, solver)
-            if reason == TOO_FAR:
-                scores.reason[row, g] = reason
-                continue
-            code = gripper_body_contact(problem, work, body_A)
-            if code != NO_CONTACT:
-                scores.reason[row, g] = GRIPPER_BLOCKED_BY_ROBOT
-                scores.contact[row, g] = code
-                continue
-            if reason != REACHED:
-                scores.reason[row, g] = reason
-                continue
-            if not environment_placed:
-                environment_in_arm_base(problem, work, torso)
-                environment_placed = True
-            reason, code = score_pair(problem, work, body_A, solver)
-            scores.reason[row, g] = reason
-            scores.contact[row, g] = code
-            if reason == REACHED:
-                write_winner(problem, solver.best, rounded, scores, row, g)
+                    better = came > farthest
+                    write_winner(problem, solver.best, rounded, scores, row, g, better)
+                    if problem.measure.of == ANY:
+                        break
+                farthest = max(farthest, came)
+
+
+@inner
+def _score_at_pose(
+    problem: Problem,
+    free: FreeGoals | None,
+    work: Workspace,
+    solver: Solver,
+    grippers: IntArray,
+    state: int,
+    torso: int,
+    pose: int,
+    is_placed: BoolArray,
+) -> tuple[int, int]:
+    """Score a pose of a goal, with what is free about it.
+
+    Args:
+        problem: The scene.
+        free: From `freedom_if_any`.
+        work: Workspace with the base in place.
+        solver: `best` is filled with the joint angles [rad] of the solution if there is one.
+        grippers: From `gripper_contacts`.
+        state: The environment state.
+        torso: The torso level.
+        pose: The pose.
+        is_placed: Whether the environment is placed in the arm base A, shape (1,); updated.
+
+    Returns:
+        Reason and contact code.
+    """
+    if free is not None:
+        if not is_placed[0]:
+            environment_in_arm_base(problem, work, torso)
+            is_placed[0] = True
+        return score_free(problem, work, solver, grippers, state, torso, pose)
+    code = grippers[state, pose]
+    if code != NO_CONTACT:
+        return GRIPPER_BLOCKED_BY_ENVIRONMENT, code
+    goal_in_arm_base(problem, work, state, torso, pose)
+    reason = out_of_reach(problem, work, solver)
+    if reason == TOO_FAR:
+        return reason, NO_CONTACT
+    body_A = problem.body_A[torso]
+    code = gripper_body_contact(problem, work, body_A)
+    if code != NO_CONTACT:
+        return GRIPPER_BLOCKED_BY_ROBOT, code
+    if reason != REACHED:
+        return reason, NO_CONTACT
+    if not is_placed[0]:
+        environment_in_arm_base(problem, work, torso)
+        is_placed[0] = True
+    return score_pair(problem, work, body_A, solver)
 
 
 @inner
 def write_winner(
-    problem: Problem, best: FloatArray, rounded: FloatArray, scores: Scores, row: int, g: int
+    problem: Problem,
+    best: FloatArray,
+    rounded: FloatArray,
+    scores: Scores,
+    row: int,
+    g: int,
+    better: bool,
 ) -> None:
-    """Store the joint angles of the best solution, rounded to float32, and the measure at these."""
+    """Store the joint angles of a solution, rounded to float32, and the measure at these.
+
+    Args:
+        problem: The scene.
+        best: Joint angles of the solution [rad], shape (7,).
+        rounded: Filled, shape (7,).
+        scores: Filled.
+        row: The configuration.
+        g: The goal.
+        better: Whether it is stored in any case; else only if the measure is above the stored one.
+    """
     rounded_inward(best, problem.arm.lower, problem.arm.upper, rounded)
-    for i in range(7):
-        scores.joints[row, g, i] = rounded[i]
-    scores.dexterity[row, g] = measure_at(problem, rounded)
+    measure = measure_at(problem, rounded)
+    if better or measure > scores.dexterity[row, g]:
+        for i in range(7):
+            scores.joints[row, g, i] = rounded[i]
+        scores.dexterity[row, g] = measure

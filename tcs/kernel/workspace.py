@@ -37,6 +37,9 @@ class Workspace(NamedTuple):
     last: IntArray
     """Last pair in contact: partner of the arm (-1 for none), arm shape, partner's shape; shape
     (3,)."""
+    met_gripper: BoolArray
+    """Set where a link of the arm touches the gripper: at another angle of the last joint it may
+    not, shape (1,)."""
     R_BW: FloatArray
     """Orientation of the environment W in the current base B, shape (3, 3)."""
     p_BW: FloatArray
@@ -60,6 +63,7 @@ def new_workspace(problem: Problem) -> Workspace:
         np.empty((8 + len(problem.coupled), 3, 3)),
         np.empty((8 + len(problem.coupled), 3)),
         np.full(3, -1, np.int64),
+        np.zeros(1, np.bool_),
         np.eye(3),
         np.zeros(3),
         np.eye(3),

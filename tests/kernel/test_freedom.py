@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from tcs.kernel import sweep
 from tcs.kernel.contacts import NO_CONTACT
+from tcs.kernel.dexterity import dexterity
 from tcs.kernel.freedom.cap import cap_cosine, cap_pose
 from tcs.kernel.freedom.forms import COLUMNS
 from tcs.kernel.freedom.goals import free_goals
@@ -91,16 +92,26 @@ def test_a_symmetric_tool_scores_the_better_of_its_poses():
     )
 
 
-def test_a_rotation_that_the_last_joint_makes_frees_nothing():
-    chain = CHAIN._replace(
-        R=CHAIN.R.copy(),
-        p=CHAIN.p.copy(),
-        lower=np.append(CHAIN.lower[:6], -np.inf),
-        upper=np.append(CHAIN.upper[:6], np.inf),
+def turning_chain(limit, chain=CHAIN):
+    """Return an arm whose last joint turns the tool on the spot, within limits [rad]."""
+    chain = chain._replace(
+        R=chain.R.copy(),
+        p=chain.p.copy(),
+        lower=np.append(chain.lower[:6], -limit),
+        upper=np.append(chain.upper[:6], limit),
     )
     chain.p[7] = [0.0, 0.0, 0.2]
-    axis = tuple(chain.R[7].T @ [0.0, 0.0, 1.0])
-    scene = scene_with(Freedom(axis=axis, rotates=True), chain=chain)
+    return chain
+
+
+def axis_of_last(chain):
+    """Return the axis of the last joint in the tool frame."""
+    return tuple(chain.R[7].T @ [0.0, 0.0, 1.0])
+
+
+def test_a_rotation_that_the_last_joint_makes_frees_nothing():
+    chain = turning_chain(np.inf)
+    scene = scene_with(Freedom(axis=axis_of_last(chain), rotates=True), chain=chain)
     # Only the gripper, which the last joint carries, tells one angle from another.
     bare = np.zeros_like(scene.arm_vs_environment), np.zeros_like(scene.arm_vs_body)
     scene = scene._replace(
@@ -116,8 +127,51 @@ def test_a_rotation_that_the_last_joint_makes_frees_nothing():
     # The bound of the wrist knows some to be too far that the arcs of the elbow leave open.
     known = (free.reason == TOO_FAR) & (nominal.reason == JOINT_LIMITS)
     np.testing.assert_array_equal(free.reason, np.where(known, TOO_FAR, nominal.reason))
-    # The search of the free joint samples other angles at each pose.
-    np.testing.assert_allclose(free.dexterity[reached], nominal.dexterity[reached], rtol=2e-3)
+    np.testing.assert_array_equal(free.joints, nominal.joints)
+
+
+@pytest.mark.parametrize("joints", ["six", "seven"])
+@pytest.mark.parametrize("limit", [np.inf, 2.0, 0.6])
+def test_a_rotation_about_the_last_axis_reaches_what_its_angles_reach(joints, limit):
+    """One angle decides for all that the last joint makes, but for contacts with the gripper."""
+    chain = CHAIN if joints == "seven" else six_joint_chain("spherical wrist", 10)
+    wide = chain._replace(lower=np.full(7, -3.0), upper=np.full(7, 3.0))
+    chain = turning_chain(limit, wide)
+    axis = axis_of_last(chain)
+    scene = toy_scene(chain, 10, obstacles=2, goals=4, states=1)
+    rows = np.repeat(Freedom(axis=axis, rotates=True).row()[None], 4, axis=0)
+    scene = scene._replace(freedom=rows)
+    grid, free = toy_grid(states=1), free_goals(scene.freedom, chain)
+    assert np.all(free.turned)
+    assert len(free.u) == 1
+    scores = scores_of(scene, grid)
+    best, angles = np.zeros(scores.reason.shape), np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    for angle in angles:
+        turned = scene.goal_R @ about(np.array(axis), angle)
+        part = scores_of(scene._replace(goal_R=turned, freedom=scene.freedom[:0]), grid)
+        best = np.maximum(best, np.where(part.reason == REACHED, part.dexterity, 0.0))
+    reached = scores.reason == REACHED
+    assert 2 < np.sum(reached) < reached.size
+    assert np.all(reached | (best == 0.0))
+    assert np.mean(reached == (best > 0.0)) > 0.97
+    both = reached & (best > 0.0)
+    assert np.all(scores.dexterity[both] >= 0.98 * best[both])
+    for h, g in np.argwhere(reached):
+        assert is_served(scene, grid, h, g, scores.joints[h, g].astype(float))
+
+
+def test_other_rotations_are_sampled():
+    chain = turning_chain(2.0)
+    last, aside = axis_of_last(chain), axis_of_last(chain._replace(R=chain.R[::-1]))
+    rows = np.stack([Freedom(axis=axis, rotates=True).row() for axis in (last, aside)])
+    np.testing.assert_array_equal(free_goals(rows, chain).turned, [True, False])
+    beside = chain._replace(p=np.array(chain.p) + 0.01)
+    assert not np.any(free_goals(rows, beside).turned)
+    # A measure that falls near limits depends on the angle of a limited joint, of no other.
+    limited = dexterity("isotropy-limited")
+    assert not np.any(free_goals(rows, chain, limited).turned)
+    endless = turning_chain(np.inf)
+    assert free_goals(rows, endless, limited).turned[0]
 
 
 def test_kernel_agrees_with_reference():
@@ -166,6 +220,7 @@ def test_a_gripper_is_blocked_where_all_its_poses_are():
         every.append(np.all(np.array(codes) != NO_CONTACT))
         samples.append(np.all(np.array(codes[: free.first[1]]) != NO_CONTACT))
     of_samples = gripper_contacts(problem)[0] != NO_CONTACT
+    np.testing.assert_array_equal(free.codes, free.first)
     parts = [np.all(of_samples[a:b]) for a, b in itertools.pairwise(free.first)]
     np.testing.assert_array_equal(parts, samples)
     np.testing.assert_array_equal(blocked_grippers(problem)[0], every)
@@ -198,6 +253,8 @@ def test_goals_with_the_same_freedom_share_their_poses():
 def test_further_poses_are_next_to_their_samples(name):
     free = free_goals(FREEDOMS[name].row()[None], CHAIN)
     samples, poses = free.first[1], len(free.u)
+    if free.fallback[0] >= 0:
+        poses = free.start[free.fallback[0]]
     assert poses > 2 * samples
     turns = Rotation.from_matrix([offset(free.form[0], u)[0] for u in free.u])
     rng = np.random.default_rng(0)
@@ -210,7 +267,8 @@ def test_further_poses_are_next_to_their_samples(name):
             np.testing.assert_allclose(np.sort(apart[two]), nearest, atol=1e-9)
         for i in two:
             assert k in free.children[free.child_first[i] : free.child_first[i + 1]]
-    assert np.all(np.bincount(free.children, minlength=poses)[samples:] > 0)
+    children = free.children[: free.child_first[poses]]
+    assert np.all(np.bincount(children, minlength=poses)[samples:] > 0)
 
 
 def cone(degrees, **more):
@@ -264,6 +322,24 @@ def test_a_wider_freedom_reaches_no_less(name, joints):
     assert 1 < np.sum(before) < before.size
 
 
+def test_any_orientation_reaches_no_less_than_a_cone():
+    """Of these pairs a wide cone reached some that the search of any orientation missed."""
+    chain = six_joint_chain("spherical wrist", 10)
+    grid, wide = toy_grid(states=1), cone(179)
+    scene = toy_scene(chain, 10, obstacles=12, goals=3, states=1)
+    freed = [
+        scores_of(scene._replace(freedom=np.repeat(free.row()[None], 3, axis=0)), grid)
+        for free in (wide, Freedom.of_orientation())
+    ]
+    reached = [scores.reason == REACHED for scores in freed]
+    assert np.sum(reached[0]) > 5
+    assert np.all(reached[1] | ~reached[0])
+    free = free_goals(Freedom.of_orientation().row()[None], chain)
+    widest = free_goals(cone(179.999999).row()[None], chain)
+    last = free.start[free.fallback[0]]
+    assert {u.tobytes() for u in widest.u + 0.0} <= {u.tobytes() for u in free.u[last:] + 0.0}
+
+
 def test_a_nominal_goal_beside_a_free_one_keeps_its_score():
     scene, grid = scene_with(FREEDOMS["orientation"]), toy_grid(states=1)
     mixed = scene._replace(freedom=scene.freedom * [[0.0], [1.0]])
@@ -275,6 +351,39 @@ def test_a_nominal_goal_beside_a_free_one_keeps_its_score():
         mixed, 1, offset(free_goals(mixed.freedom, CHAIN).form[1], np.array([1.0, 0.2, 0, 0, 0, 0]))
     )
     assert np.abs(moved.goal_R[:, 1] - scene.goal_R[:, 1]).max() > 0.1
+
+
+def test_prismatic_joints_that_come_first_bound_the_wrist(rng):
+    chain = random_arm(rng)
+    sliding = np.array([0.0, 1.0, 1.0, 2.0, 0.0, 0.0, 0.0])
+    R, p = chain.R.copy(), chain.p.copy()
+    R[1], p[1] = np.eye(3), 0.0
+    lower, upper = np.maximum(chain.lower, -np.pi), np.minimum(chain.upper, np.pi)
+    lower[:4], upper[:4] = [0.0, -0.2, 0.1, 0.0], [0.0, 0.3, 0.9, 0.2]
+    chain = chain._replace(R=R, p=p, lower=lower, upper=upper, joints=6, slides=sliding)
+    reach = wrist_reach(chain)
+    assert reach.slabs.shape == (3, 4)
+    nearest = np.full(3, np.inf)
+    for n in range(2000):
+        q = rng.uniform(lower, upper)
+        if n < 1000:
+            q[1:4] = np.where(n >> np.arange(3) & 1, lower[1:4], upper[1:4])
+        R_AT, p_AT = link_poses(chain, q)[-1]
+        away = p_AT + R_AT @ reach.wrist - reach.pivot
+        assert np.linalg.norm(away) <= reach.span
+        left = reach.slabs[:, 3] - np.abs(reach.slabs[:, :3] @ away)
+        nearest = np.minimum(nearest, left)
+    assert np.all((nearest >= 0.0) & (nearest < 0.5 * reach.slabs[:, 3]))
+
+
+@pytest.mark.parametrize(
+    "free", [*FREEDOMS.values(), cone(70), Freedom(axis=X, fold=2, tilt=0.3)], ids=str
+)
+def test_wrists_are_in_a_sphere(free):
+    free = free_goals(free.row()[None], CHAIN)
+    away = np.linalg.norm(free.wrist - free.around[0, :3], axis=1)
+    assert np.all(away <= free.around[0, 3] + 1e-9)
+    assert np.max(away) > 0.4 * free.around[0, 3]
 
 
 def straight_chain(joints):

@@ -189,7 +189,7 @@ def scores_of(scene, grid, cuts=None, measure="isotropy", numeric=False):
     problem = build_problem(scene, measure)
     if numeric:
         problem = problem._replace(arm=outside_solver(scene.chain))
-    size, goals = size_of(grid), scene.goal_p.shape[1]
+    size, goals = size_of(grid), problem.goals
     scores = Scores(
         # Values that no score has, so that unfilled entries are detected.
         reason=np.full((size, goals), 99, np.uint8),

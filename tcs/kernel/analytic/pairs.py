@@ -14,13 +14,14 @@ from tcs.kernel.analytic.intervals import divide_intervals
 from tcs.kernel.analytic.scratch import (
     NO_PAIR,
     Search,
+    add_candidate,
     best_of,
     fill_samples,
     measure_feasible,
     solve,
     sort_candidates,
 )
-from tcs.kernel.analytic.search import find_candidates, record_all
+from tcs.kernel.analytic.search import find_candidates, greatest_slack, record_all
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, int_constant
 from tcs.kernel.contacts import NO_CONTACT, arm_contact, at_goal
@@ -42,6 +43,12 @@ QUICK_TRIES = int_constant(48)
 WORTH = 1.00001
 """By what factor a solution found later must be better to replace one: isotropy counts to the sixth
 power here, and rounding joints to float32 costs up to 1e-7."""
+NEARBY = 0.25
+"""Range of the free joint about a known solution in which one for a pose next to it is tried, to
+either side [rad]."""
+BETWEEN_SAMPLES, TILT_SLOPE = 0.3, 5.0
+"""What the slack may gain between samples of the free joint, and with the tilt of the tool [1/rad]:
+joint angles change by a few radians per radian of either, and much faster at singularities only."""
 
 
 @inner
@@ -256,13 +263,15 @@ def quick_look(
     """Return REACHED if a sample of the free joint serves a goal, else a likely reason.
 
     What lies between the samples is left out: `score_pair` finds more, at several times the cost.
+    With a bound, the best sample is refined; without one, `score_pair` goes on from any.
 
     Args:
         problem: The scene.
         work: Workspace with environment, base, gripper and goal in place.
         body_A: The robot's other shapes in A at the current torso level.
         least: Measure that the sample has to exceed; negative for any.
-        search: As filled by `out_of_reach`.
+        search: As filled by `out_of_reach`; `best` is filled with the joint angles [rad] of the
+            solution if there is one.
 
     Returns:
         Reason and contact code.
@@ -271,20 +280,88 @@ def quick_look(
     if not found:
         return JOINT_LIMITS, NO_CONTACT
     if least >= 0.0:
-        _measure_candidates(problem, search, NONE, found)
-        bound = least**6 if samples_hold_measure(problem) else least
-        winner, contact = best_free(problem, work, body_A, search, NONE, found, bound)
-        return REACHED if winner >= 0 else ARM_BLOCKED, contact
+        return _best_above(problem, work, body_A, search, found, least)
     contact = NO_CONTACT
     for n in range(0, found, 1 + found // QUICK_TRIES):
         branch = problem.arm.branches[search.found_branch[n]]
         sample_joints(problem.arm, search.goal, branch, search.found_angle[n], search.q)
         code = arm_contact(problem, work, body_A, search.q)
         if code == NO_CONTACT and at_goal(problem, work):
-            return REACHED, NO_CONTACT
+            return score_pair(problem, work, body_A, search)
         if n == 0:
             contact = code
     return ARM_BLOCKED, contact
+
+
+@inner
+def look_near(
+    problem: Problem, work: Workspace, body_A: FloatArray, least: float, search: Search
+) -> tuple[int, int]:
+    """Score a goal next to one whose solution is known, by the angles near that of its free joint.
+
+    Args:
+        problem: The scene.
+        work: Workspace with environment, base, gripper and goal in place.
+        body_A: The robot's other shapes in A at the current torso level.
+        least: Measure that the solution has to exceed.
+        search: As filled by `out_of_reach`; `best` holds the known solution, and is filled with the
+            joint angles [rad] of the new one if there is one.
+
+    Returns:
+        Reason and contact code.
+    """
+    arm, found = problem.arm, NONE
+    middle = search.best[arm.free]
+    low, high = max(middle - NEARBY, arm.lower[arm.free]), min(middle + NEARBY, arm.upper[arm.free])
+    for b in range(len(arm.branches)):
+        step = fill_samples(search, low, high, REFINE_SAMPLES)
+        solve(arm, search, b, REFINE_SAMPLES)
+        measure_feasible(arm, search, REFINE_SAMPLES)
+        for i in range(REFINE_SAMPLES):
+            if search.slack[i] >= 0.0:
+                found = add_candidate(search, b, i, step, found)
+    if not found:
+        return JOINT_LIMITS, NO_CONTACT
+    return _best_above(problem, work, body_A, search, found, least)
+
+
+@inner
+def _best_above(
+    problem: Problem,
+    work: Workspace,
+    body_A: FloatArray,
+    search: Search,
+    found: int,
+    least: float,
+) -> tuple[int, int]:
+    """Refine the best collision-free candidate above a measure; return reason and contact code."""
+    _measure_candidates(problem, search, NONE, found)
+    bound = least**6 if samples_hold_measure(problem) else least
+    winner, contact = best_free(problem, work, body_A, search, NONE, found, bound)
+    if winner < 0:
+        return ARM_BLOCKED, contact
+    refine(problem, work, body_A, search, winner, REFINEMENTS, -1.0)
+    return REACHED, NO_CONTACT
+
+
+@inner
+def tilt_to_limits(problem: Problem, work: Workspace, search: Search) -> float:
+    """Return an angle by which a goal that fails at joint limits may tilt without being reached.
+
+    All samples of the free joint have a joint far beyond its limits.
+
+    Args:
+        problem: The scene.
+        work: Workspace with the goal in place.
+        search: As filled by `out_of_reach`.
+
+    Returns:
+        The angle [rad], 0 if unknown.
+    """
+    if search.arc_count[0] == 0:
+        return 0.0
+    beyond = -greatest_slack(problem.arm, search, search.arc_count[0])
+    return max(beyond - BETWEEN_SAMPLES, 0.0) / TILT_SLOPE
 
 
 @inner

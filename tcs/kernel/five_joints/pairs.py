@@ -166,6 +166,7 @@ def score_turned(
     R: FloatArray,
     p: FloatArray,
     least: float,
+    near: bool,
     solver: FiveJointSolver,
 ) -> tuple[int, int]:
     """Score a tool pose that is free to rotate about the axis; nothing is checked before.
@@ -179,6 +180,7 @@ def score_turned(
         R: Tool orientation in W at angle 0, shape (3, 3).
         p: Tool position in W [m], shape (3,).
         least: Without use here: all solutions are as quick to find as some.
+        near: Without use as well.
         solver: `best` is filled with the joint angles [rad] of the best solution if there is one.
 
     Returns:

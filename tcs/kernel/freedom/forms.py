@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from tcs.kernel.arrays import FloatArray, IntArray
+from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
 from tcs.kernel.cache import inner
 from tcs.kernel.low_discrepancy import spread
 
@@ -46,13 +46,34 @@ DIRECTIONS = 96
 """Number of them for an arm that finds the angle about the axis."""
 SUBDIVISIONS = 4
 """Parts into which the spacing of the samples is divided where none of them reaches a goal."""
+WIDEST_STEP = np.radians(40.0)
+"""Greatest step of a tilt from which the best pose is refined [rad]."""
 WITHIN = 1e-9
 """Rounding of a bound [rad or m]."""
 FURTHER = 20
 """Further poses for each sample of a tool that may have any orientation."""
 FULL_TURN = 2.0 * np.pi
+FEW = 8
+"""Angles that the last joint makes, where it turns the tool about the axis, at a pose that is
+tilted or displaced; at the nominal one, ANGLES * SUBDIVISIONS."""
 FEWEST_JOINTS = 5
 """Number of joints of an arm that finds the angle about the axis together with its joints."""
+
+
+def _turns() -> FloatArray:
+    """Return angles about an axis in the order in which they are tried [rad].
+
+    The first FEW and the first ANGLES divide a turn evenly, and so do all together.
+    """
+    finest = ANGLES * SUBDIVISIONS
+    # A multiple of a number without common divisor jumps around the circle.
+    order = (37 * np.arange(finest)) % finest
+    is_few, is_angle = order % (finest // FEW) == 0, order % SUBDIVISIONS == 0
+    parts = order[is_few], order[is_angle & ~is_few], order[~is_angle]
+    return FULL_TURN / finest * np.concatenate(parts)
+
+
+TURNS = _turns()
 
 
 class Poses(NamedTuple):
@@ -71,13 +92,31 @@ class Poses(NamedTuple):
     """Further poses by their numbers: each twice, unless both its samples are one."""
 
 
+COARSE = 0.75
+"""Part of the greatest tilt at which some tilts are tried although another one reaches the goal."""
+
+
+def coarse_tilts(form: FloatArray, u: FloatArray) -> BoolArray:
+    """Return whether samples of a cone are every second one of a ring near its rim, shape (n,)."""
+    tilt = np.hypot(u[:, 1], u[:, 2])
+    found = np.zeros(len(u), np.bool_)
+    rings = TILTS[form[TILT] + WITHIN >= TILTS]
+    if len(rings):
+        ring = rings[np.argmin(np.abs(rings - COARSE * form[TILT]))]
+        alone = np.all(u[:, [0, 3, 4, 5]] == 0.0, axis=1) & (np.abs(tilt - ring) < WITHIN)
+        # The further poses follow the samples, half-way between them.
+        number = AROUND[int(np.argmin(np.abs(TILTS - ring)))]
+        found[np.flatnonzero(alone)[:number:2]] = True
+    return found
+
+
 def spacing(form: FloatArray) -> FloatArray:
     """Return the steps from which the best pose is refined, 0 where not free, shape (6,)."""
     step = np.zeros(PARAMETERS)
     others = form[TILT] > 0.0 or np.any(form[HALF : HALF + 3] > 0.0)
     step[0] = FULL_TURN / ANGLES * (4.0 if others else 1.0) if form[ROTATES] else 0.0
-    step[1:3] = 0.4 * form[TILT]
-    step[3:6] = 0.4 * form[HALF : HALF + 3]
+    step[1:3] = min(form[TILT], WIDEST_STEP)
+    step[3:6] = form[HALF : HALF + 3]
     return step
 
 

@@ -1,4 +1,4 @@
-"""Score of one initial configuration at one goal, over the freedom of the goal."""
+"""Score of one initial configuration at one pose of a goal, over what is free about it."""
 
 from __future__ import annotations
 
@@ -10,9 +10,19 @@ from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.base_pose import pose_in_arm_base
 from tcs.kernel.cache import inner
 from tcs.kernel.contacts import NO_CONTACT, gripper_contact_at
+from tcs.kernel.dexterity import ANY as ANY_MEASURE
 from tcs.kernel.dexterity.measures import measure_at
-from tcs.kernel.freedom.cap import cap_cosine, cap_pose, norm
-from tcs.kernel.freedom.forms import FEWEST_JOINTS, HALF, PARAMETERS, TILT, pose_of
+from tcs.kernel.freedom.cap import cap_cosine, cap_pose
+from tcs.kernel.freedom.forms import (
+    FEW,
+    FEWEST_JOINTS,
+    FULL_TURN,
+    HALF,
+    PARAMETERS,
+    TILT,
+    TURNS,
+    pose_of,
+)
 from tcs.kernel.freedom.goals import FreeGoals
 from tcs.kernel.kinematics import copy_joints
 from tcs.kernel.problem import Problem
@@ -23,12 +33,14 @@ from tcs.kernel.scores import (
     JOINT_LIMITS,
     REACHED,
     TOO_FAR,
+    progress_of,
 )
-from tcs.kernel.solvers import THOROUGH, Solver, score_pose
+from tcs.kernel.solvers import THOROUGH, Solver, score_pose, tilt_to_limits
 from tcs.kernel.workspace import Workspace
 
-ROUNDS = 5
-"""Number of refinement rounds; each halves the distance of the poses tried from the best one."""
+SCALES = np.array([0.4, 0.2, 0.1])
+"""Distances of the poses tried from the best one, in rounds of the refinement, as parts of the
+range of each parameter."""
 PROMISING = 2
 """Progress of a sample from which further poses next to it are tried."""
 CLOSE, PART = 4, 3
@@ -45,17 +57,29 @@ NEAR = 0.96
 at samples of the free joint are this close to the best between them."""
 ANY = -1.0
 """Bound of a measure that every solution exceeds."""
+UNKNOWN = -2
+"""In place of a contact code of the gripper: not looked for yet."""
+ROUNDING = 1e-9
+"""Rounding of a squared tilt [rad^2]."""
+NO_SAMPLE = -1
+"""In place of the number of a sample: a tool pose between them."""
+
+
+MOST_HOPELESS = 64
+"""Most tilts that are remembered because all tilts around them fail at joint limits."""
 
 
 class PlacedGoal(NamedTuple):
-    """A goal at an initial configuration, whose base is in place."""
+    """A pose of a goal at an initial configuration, whose base is in place."""
 
     state: int
     """The environment state."""
     torso: int
     """The torso level."""
     goal: int
-    """The goal."""
+    """Number of the pose."""
+    list: int
+    """Number of the list of tool poses that are tried."""
 
 
 @inner
@@ -68,50 +92,98 @@ def score_free(
     torso: int,
     g: int,
 ) -> tuple[int, int]:
-    """Score a goal over its freedom: the best of its poses, refined.
+    """Score a pose over what is free about it: the best tool pose, refined.
 
     The samples are tried first. Where none reaches the goal, further poses follow, until one
     reaches it: those next to samples that come close, then, where any orientation serves, poses
-    made within reach. About the best pose, each free parameter is then varied by half the spacing,
-    a quarter, and so on.
+    made within reach, and those of the widest cone. About the best pose, each free parameter is
+    then varied by half the spacing, a quarter, and so on.
 
     Args:
         problem: The scene.
         work: Workspace with the environment in the arm base A.
         solver: `best` is filled with the joint angles [rad] of the solution if there is one.
         grippers: Contact codes of the gripper with the environment at each sample, shape (states,
-            samples).
+            codes).
         state: The environment state.
         torso: The torso level.
-        g: The goal.
+        g: The pose.
 
     Returns:
-        Reason and contact code, those of the first pose that comes farthest.
+        Reason and contact code, those of the first tool pose that comes farthest.
     """
-    free, form = problem.freedom, problem.freedom.form[g]
-    goal = PlacedGoal(state, torso, g)
-    pivot, best, u = np.empty(3), np.empty(7), np.empty(PARAMETERS)
-    _pivot_in_goal(problem, work, goal, pivot)
-    if _is_out_of_span(problem, pivot, g):
-        return TOO_FAR, NO_CONTACT
-    worth = np.empty(free.first[g + 1] - free.first[g], np.int64)
-    top, reason, contact = _try_samples(problem, work, solver, grippers, goal, pivot, worth, best)
+    free = problem.freedom
+    goal = PlacedGoal(state, torso, g, g)
+    best, u = np.empty(7), np.empty(PARAMETERS)
+    bounds = _reach_in_goal(problem, work, goal)
+    reason = _reach_of(bounds, free.around[g], free.around[g, 3])
+    if reason != REACHED:
+        return reason, NO_CONTACT
+    reason, contact = _search_list(problem, work, solver, grippers, goal, bounds, u, best)
+    if reason != REACHED and _is_spread(free, goal):
+        cone = PlacedGoal(state, torso, g, free.fallback[g])
+        if _try_cap(problem, work, solver, grippers, goal, bounds, u):
+            reason = REACHED
+            copy_joints(solver.best, best)
+        elif _search_list(problem, work, solver, grippers, cone, bounds, u, best)[0] == REACHED:
+            reason = REACHED
+    if reason != REACHED:
+        return reason, contact
+    if problem.measure.of != ANY_MEASURE:
+        _refine(problem, work, solver, grippers, goal, u, best, measure_at(problem, best))
+    copy_joints(best, solver.best)
+    return REACHED, NO_CONTACT
+
+
+@inner
+def _search_list(
+    problem: Problem,
+    work: Workspace,
+    solver: Solver,
+    grippers: IntArray,
+    goal: PlacedGoal,
+    bounds: FloatArray,
+    u: FloatArray,
+    best: FloatArray,
+) -> tuple[int, int]:
+    """Try the tool poses of a list: the best sample, or the first further one that reaches.
+
+    Args:
+        problem: The scene.
+        work: Workspace with the environment in the arm base A.
+        solver: The arm's solver.
+        grippers: As for `score_free`.
+        goal: The pose and the list.
+        bounds: From `_reach_in_goal`.
+        u: Filled with the parameters of the tool pose if there is one.
+        best: Filled with the joint angles [rad] there.
+
+    Returns:
+        Reason and contact code, those of the first tool pose that comes farthest.
+    """
+    free = problem.freedom
+    worth = np.empty(free.first[goal.list + 1] - free.first[goal.list], np.int64)
+    hopeless = np.zeros((1 + MOST_HOPELESS, 4))
+    top, reason, contact = _try_samples(
+        problem, work, solver, grippers, goal, bounds, worth, hopeless, best
+    )
     if top < 0:
         top, reason, contact = _try_next_to(
-            problem, work, solver, goal, pivot, worth, reason, contact
+            problem, work, solver, grippers, goal, bounds, worth, hopeless, reason, contact
         )
         if top >= 0:
             copy_joints(solver.best, best)
-    if top >= 0:
-        for k in range(PARAMETERS):
-            u[k] = free.u[free.start[g] + top, k]
-    elif form[TILT] < np.pi or not _try_cap(problem, work, solver, goal, pivot, u):
+    if top < 0:
         return reason, contact
-    else:
-        copy_joints(solver.best, best)
-    _refine(problem, work, solver, goal, u, best, measure_at(problem, best))
-    copy_joints(best, solver.best)
+    for k in range(PARAMETERS):
+        u[k] = free.u[free.start[goal.list] + top, k]
     return REACHED, NO_CONTACT
+
+
+@inner
+def _is_spread(free: FreeGoals, goal: PlacedGoal) -> bool:
+    """Return whether the list is that of any orientation, of poses spread over all of them."""
+    return free.form[goal.goal, TILT] >= np.pi and goal.list == goal.goal
 
 
 @inner
@@ -121,11 +193,12 @@ def _try_samples(
     solver: Solver,
     grippers: IntArray,
     goal: PlacedGoal,
-    pivot: FloatArray,
+    bounds: FloatArray,
     worth: IntArray,
+    hopeless: FloatArray,
     best: FloatArray,
 ) -> tuple[int, int, int]:
-    """Try all samples of a goal.
+    """Try the samples of a goal: all that are to be tried, of the others until one reaches it.
 
     Args:
         problem: The scene.
@@ -133,39 +206,52 @@ def _try_samples(
         solver: The arm's solver.
         grippers: As for `score_free`.
         goal: The goal.
-        pivot: The pivot in the frame of the goal [m], shape (3,).
+        bounds: From `_reach_in_goal`.
         worth: Filled with how many of the poses next to each sample are worth a try: ALL, SOME or
             NONE; shape (samples,).
+        hopeless: Filled with the tilts about which others fail, see `_is_hopeless`.
         best: Filled with the joint angles [rad] at the best sample.
 
     Returns:
         The best sample, or -1; reason and contact code of the first one that comes farthest.
     """
-    free, state, g = problem.freedom, goal.state, goal.goal
-    form, start = free.form[g], free.start[g]
-    any_orientation = form[TILT] >= np.pi
+    free, start = problem.freedom, problem.freedom.start[goal.list]
+    any_orientation = _is_spread(free, goal)
     reason, contact, farthest = TOO_FAR, NO_CONTACT, -1
     # Poses of any orientation are many: what one of them leaves out, another one finds.
     value, top, least = -1.0, -1, ANY if any_orientation else THOROUGH
     for n in range(len(worth)):
-        worth[n] = ALL
-        if not _is_within_reach(free, start + n, pivot):
-            # The edge of what is within reach may be next to it.
+        if top >= 0 and problem.measure.of == ANY_MEASURE:
+            break
+        if top >= 0 and not free.is_tried[start + n]:
             continue
-        why, code = GRIPPER_BLOCKED_BY_ENVIRONMENT, grippers[state, free.first[g] + n]
-        if code == NO_CONTACT:
-            why, code = _score_at(problem, work, solver, goal, free.u[start + n], least)
-            if why == REACHED:
-                measure = measure_at(problem, solver.best)
-                if measure > value:
-                    value, top, least = measure, n, NEAR * measure
-                    copy_joints(solver.best, best)
+        worth[n] = ALL
+        why, code = _reach_of(bounds, free.wrist[start + n], 0.0), NO_CONTACT
+        if why != REACHED:
+            # The edge of what is within reach may be next to it.
             came = progress_of(why)
-            if came < PROMISING:
-                worth[n] = NONE
-            elif any_orientation and came < CLOSE:
-                worth[n] = SOME
+            if came > farthest:
+                farthest, reason, contact = came, why, code
+            continue
+        u = free.u[start + n]
+        if _is_hopeless(hopeless, u):
+            continue
+        near = top >= 0 and not any_orientation and (u[1] != 0.0 or u[2] != 0.0)
+        if near:
+            copy_joints(best, solver.best)
+        why, code = _score_at(problem, work, solver, grippers, goal, n, u, least, near)
+        if why == JOINT_LIMITS:
+            _remember(hopeless, u, tilt_to_limits(problem, work, solver))
+        if why == REACHED:
+            measure = measure_at(problem, solver.best)
+            if measure > value:
+                value, top, least = measure, n, NEAR * measure
+                copy_joints(solver.best, best)
         came = progress_of(why)
+        if came < PROMISING and why != GRIPPER_BLOCKED_BY_ENVIRONMENT:
+            worth[n] = NONE
+        elif PROMISING <= came < CLOSE and any_orientation:
+            worth[n] = SOME
         if came > farthest:
             farthest, reason, contact = came, why, code
     return top, reason, contact
@@ -176,9 +262,11 @@ def _try_next_to(
     problem: Problem,
     work: Workspace,
     solver: Solver,
+    grippers: IntArray,
     goal: PlacedGoal,
-    pivot: FloatArray,
+    bounds: FloatArray,
     worth: IntArray,
+    hopeless: FloatArray,
     reason: int,
     contact: int,
 ) -> tuple[int, int, int]:
@@ -188,19 +276,18 @@ def _try_next_to(
         problem: The scene.
         work: Workspace with the environment in the arm base A.
         solver: `best` is filled with the joint angles [rad] of the solution if there is one.
+        grippers: As for `score_free`.
         goal: The goal.
-        pivot: The pivot in the frame of the goal [m], shape (3,).
+        bounds: From `_reach_in_goal`.
         worth: From `_try_samples`.
+        hopeless: From `_try_samples`, and filled on.
         reason: Reason of the sample that came farthest.
         contact: Contact code of that sample.
 
     Returns:
         The pose that reaches the goal, or -1; reason and contact code as `_try_samples`.
     """
-    free, g, R, p = problem.freedom, goal.goal, np.empty((3, 3)), np.empty(3)
-    form, start = free.form[g], free.start[g]
-    R_WG, p_WG = problem.goal_R[goal.state, g], problem.goal_p[goal.state, g]
-    usual = ANY if form[TILT] >= np.pi else THOROUGH
+    free, start = problem.freedom, problem.freedom.start[goal.list]
     farthest = progress_of(reason)
     for n in range(len(worth)):
         first, last = free.child_first[start + n], free.child_first[start + n + 1]
@@ -210,20 +297,20 @@ def _try_next_to(
             last = first + (last - first) // PART
         for child in range(first, last):
             k = free.children[child]
-            if not _is_within_reach(free, start + k, pivot):
+            if _reach_of(bounds, free.wrist[start + k], 0.0) != REACHED:
                 continue
             nearest = free.parents[start + k, 0]
             if nearest != n and worth[nearest] >= worth[n]:
                 # Tried as a pose next to the other sample.
                 continue
-            why, code = GRIPPER_BLOCKED_BY_ENVIRONMENT, NO_CONTACT
-            if problem.joints > FEWEST_JOINTS:
-                pose_of(form, free.u[start + k], R_WG, p_WG, R, p)
-                code = gripper_contact_at(problem, work, goal.state, R, p)
-            if code == NO_CONTACT:
-                why, code = _score_at(problem, work, solver, goal, free.u[start + k], usual)
+            u = free.u[start + k]
+            if _is_hopeless(hopeless, u):
+                continue
+            why, code = _score_at(problem, work, solver, grippers, goal, NO_SAMPLE, u, ANY, False)
             if why == REACHED:
                 return k, why, code
+            if why == JOINT_LIMITS:
+                _remember(hopeless, u, tilt_to_limits(problem, work, solver))
             came = progress_of(why)
             if came > farthest:
                 farthest, reason, contact = came, why, code
@@ -231,12 +318,53 @@ def _try_next_to(
 
 
 @inner
+def _remember(hopeless: FloatArray, u: FloatArray, radius: float) -> None:
+    """Remember a tilt about which all tilts by up to a radius fail, see `_is_hopeless`."""
+    count = int(hopeless[0, 0])
+    if radius <= 0.0 or count == MOST_HOPELESS or not _is_tilt(u):
+        return
+    hopeless[0, 0] += 1.0
+    found = hopeless[1 + count]
+    found[0], found[1], found[2] = u[1], u[2], radius
+    found[3] = u[1] * u[1] + u[2] * u[2]
+
+
+@inner
+def _is_hopeless(hopeless: FloatArray, u: FloatArray) -> bool:
+    """Return whether a tool pose is a tilt close to one that fails far beyond joint limits.
+
+    A cone that contains it has tried that one, too, which is tilted no farther: a wider one leaves
+    out no more.
+
+    Args:
+        hopeless: Their number, then the two parameters of each tilt, the radius about it and its
+            squared angle, shape (1 + MOST_HOPELESS, 4).
+        u: Parameters of the tool pose, shape (PARAMETERS,).
+    """
+    if hopeless[0, 0] == 0.0 or not _is_tilt(u):
+        return False
+    square = u[1] * u[1] + u[2] * u[2]
+    for n in range(1, 1 + int(hopeless[0, 0])):
+        x, y, radius = u[1] - hopeless[n, 0], u[2] - hopeless[n, 1], hopeless[n, 2]
+        if x * x + y * y <= radius * radius and hopeless[n, 3] <= square + ROUNDING:
+            return True
+    return False
+
+
+@inner
+def _is_tilt(u: FloatArray) -> bool:
+    """Return whether only the tilt of a tool pose differs from the nominal one."""
+    return u[0] == 0.0 and u[3] == 0.0 and u[4] == 0.0 and u[5] == 0.0
+
+
+@inner
 def _try_cap(
     problem: Problem,
     work: Workspace,
     solver: Solver,
+    grippers: IntArray,
     goal: PlacedGoal,
-    pivot: FloatArray,
+    bounds: FloatArray,
     u: FloatArray,
 ) -> bool:
     """Try poses made within reach of a goal that any orientation serves, until one reaches it.
@@ -245,27 +373,25 @@ def _try_cap(
         problem: The scene.
         work: Workspace with the environment in the arm base A.
         solver: `best` is filled with the joint angles [rad] of the solution if there is one.
+        grippers: As for `score_free`.
         goal: The goal.
-        pivot: The pivot in the frame of the goal [m], shape (3,).
+        bounds: From `_reach_in_goal`.
         u: Filled with the parameters of the pose that reaches the goal.
     """
-    free, g, R, p = problem.freedom, goal.goal, np.empty((3, 3)), np.empty(3)
-    form, reach = free.form[g], free.reach
-    R_WG, p_WG = problem.goal_R[goal.state, g], problem.goal_p[goal.state, g]
-    cosine = cap_cosine(reach.wrist, pivot, reach.span)
+    form, reach = problem.freedom.form[goal.goal], problem.freedom.reach
+    cosine = cap_cosine(reach.wrist, bounds[0, :3], reach.span)
     if cosine < WIDEST_CAP or cosine > 1.0:
         return False
     tries = 0
     for n in range(IN_CAP):
         if tries == TRIES_IN_CAP:
             break
-        cap_pose(form, reach.wrist, pivot, cosine, n, u)
-        pose_of(form, u, R_WG, p_WG, R, p)
-        if gripper_contact_at(problem, work, goal.state, R, p) != NO_CONTACT:
-            continue
-        if _score_at(problem, work, solver, goal, u, ANY)[0] == REACHED:
+        cap_pose(form, reach.wrist, bounds[0, :3], cosine, n, u)
+        why, _ = _score_at(problem, work, solver, grippers, goal, NO_SAMPLE, u, ANY, False)
+        if why == REACHED:
             return True
-        tries += 1
+        if why != GRIPPER_BLOCKED_BY_ENVIRONMENT:
+            tries += 1
     return False
 
 
@@ -274,15 +400,167 @@ def _score_at(
     problem: Problem,
     work: Workspace,
     solver: Solver,
+    grippers: IntArray,
     goal: PlacedGoal,
+    sample: int,
     u: FloatArray,
     least: float,
+    near: bool,
 ) -> tuple[int, int]:
-    """Score the pose with parameters u, the gripper being free of the environment."""
-    state, torso, g, R, p = goal.state, goal.torso, goal.goal, np.empty((3, 3)), np.empty(3)
-    R_WG, p_WG, body_A = problem.goal_R[state, g], problem.goal_p[state, g], problem.body_A[torso]
-    pose_of(problem.freedom.form[g], u, R_WG, p_WG, R, p)
-    return score_pose(problem, work, body_A, state, torso, R, p, least, solver)
+    """Score a tool pose.
+
+    Args:
+        problem: The scene.
+        work: Workspace with the environment in the arm base A.
+        solver: `best` is filled with the joint angles [rad] of the solution if there is one.
+        grippers: As for `score_free`.
+        goal: The goal.
+        sample: Number of the sample in its list, NO_SAMPLE for another tool pose.
+        u: Parameters of the tool pose, shape (PARAMETERS,).
+        least: As for `score_pose`.
+        near: As for `score_pose`.
+    """
+    state, torso, g = goal.state, goal.torso, goal.goal
+    if problem.freedom.turned[g]:
+        return _score_turned(problem, work, solver, grippers, goal, sample, u, least, near)
+    R, p, body_A = np.empty((3, 3)), np.empty(3), problem.body_A[torso]
+    code = _gripper_contact(problem, work, grippers, goal, sample, 0, u, R, p)
+    if code != NO_CONTACT:
+        return GRIPPER_BLOCKED_BY_ENVIRONMENT, code
+    return score_pose(problem, work, body_A, state, torso, R, p, least, near, solver)
+
+
+@inner
+def _score_turned(
+    problem: Problem,
+    work: Workspace,
+    solver: Solver,
+    grippers: IntArray,
+    goal: PlacedGoal,
+    sample: int,
+    u: FloatArray,
+    least: float,
+    near: bool,
+) -> tuple[int, int]:
+    """Score a tool pose that the last joint may turn on the spot.
+
+    The other joints do not depend on the angle, nor does the measure. So one angle decides for all
+    at which the last joint is within its limits, unless a link touched the gripper, which turns;
+    further angles are tried until those at hand cover every angle of the last joint.
+
+    The arguments are those of `_score_at`; u is the tool pose at angle 0.
+    """
+    state, torso, body_A = goal.state, goal.torso, problem.body_A[goal.torso]
+    R, p, turned = np.empty((3, 3)), np.empty(3), np.empty(PARAMETERS)
+    last = problem.arm.upper[6] - problem.arm.lower[6]
+    tried, tries, met_gripper = np.empty(len(TURNS)), 0, False
+    found, value, kept = False, -1.0, np.empty(7)
+    reason, contact, farthest = TOO_FAR, NO_CONTACT, -1
+    for angle in range(angles_of(problem.freedom, goal.goal, sample)):
+        if found and (problem.measure.of == ANY_MEASURE or (met_gripper and angle >= FEW)):
+            break
+        if tries and not met_gripper and _is_covered(tried, tries, TURNS[angle], last):
+            if last >= FULL_TURN:
+                break
+            continue
+        turned_parameters(u, angle, turned)
+        why = GRIPPER_BLOCKED_BY_ENVIRONMENT
+        code = _gripper_contact(problem, work, grippers, goal, sample, angle, turned, R, p)
+        if code == NO_CONTACT:
+            work.met_gripper[0] = False
+            why, code = score_pose(problem, work, body_A, state, torso, R, p, least, near, solver)
+            if why != GRIPPER_BLOCKED_BY_ROBOT:
+                tried[tries] = TURNS[angle]
+                tries += 1
+                met_gripper = (why == ARM_BLOCKED or why == REACHED) and work.met_gripper[0]
+            if why == REACHED:
+                measure = measure_at(problem, solver.best)
+                if measure > value:
+                    found, value, least = True, measure, max(least, NEAR * measure)
+                    copy_joints(solver.best, kept)
+        came = progress_of(why)
+        if came > farthest:
+            farthest, reason, contact = came, why, code
+    if found:
+        copy_joints(kept, solver.best)
+    return reason, contact
+
+
+@inner
+def _is_covered(tried: FloatArray, tries: int, angle: float, last: float) -> bool:
+    """Return whether angles that were tried leave the last joint nothing new at another one.
+
+    Where two angles are no farther apart than its range, the values that it takes at an angle in
+    between are among those at these two.
+
+    Args:
+        tried: Angles that were tried [rad], shape (tries or more,).
+        tries: Their number, one or more.
+        angle: The angle [rad].
+        last: Range of the last joint [rad].
+    """
+    before, after = FULL_TURN, FULL_TURN
+    for k in range(tries):
+        back = (angle - tried[k]) % FULL_TURN
+        before, after = min(before, back), min(after, (FULL_TURN - back) % FULL_TURN)
+    return before + after <= last
+
+
+@inner
+def _gripper_contact(
+    problem: Problem,
+    work: Workspace,
+    grippers: IntArray,
+    goal: PlacedGoal,
+    sample: int,
+    angle: int,
+    u: FloatArray,
+    R: FloatArray,
+    p: FloatArray,
+) -> int:
+    """Fill the tool pose in W of parameters u; return the gripper's contact with the environment.
+
+    For the sample and the number of the angle, the contact is known in most cases; of an arm of
+    five joints, it is checked when the arm is solved.
+    """
+    free, g, state = problem.freedom, goal.goal, goal.state
+    first, last = free.codes[goal.list], free.codes[goal.list + 1]
+    code = UNKNOWN
+    if sample != NO_SAMPLE and last > first:
+        if free.turned[g] and sample > 0:
+            first += len(TURNS) + FEW * (sample - 1)
+        elif not free.turned[g]:
+            first += sample
+        code = grippers[state, first + angle]
+    if code >= 0:
+        return code
+    pose_of(free.form[g], u, problem.goal_R[state, g], problem.goal_p[state, g], R, p)
+    if code == NO_CONTACT or problem.joints == FEWEST_JOINTS:
+        return NO_CONTACT
+    return gripper_contact_at(problem, work, state, R, p)
+
+
+@inner
+def angles_of(free: FreeGoals, g: int, sample: int) -> int:
+    """Return the number of angles at which the arm turns a tool pose, see `TURNS`.
+
+    Args:
+        free: The freedom.
+        g: Number of a pose.
+        sample: Number of a sample of it, 0 for the nominal tool pose, NO_SAMPLE for others.
+    """
+    if not free.turned[g]:
+        return 1
+    return len(TURNS) if sample == 0 else FEW
+
+
+@inner
+def turned_parameters(u: FloatArray, angle: int, turned: FloatArray) -> None:
+    """Fill the parameters of a tool pose that is turned by an angle of `TURNS`."""
+    for k in range(PARAMETERS):
+        turned[k] = u[k]
+    if angle:
+        turned[0] += TURNS[angle]
 
 
 @inner
@@ -290,19 +568,15 @@ def _refine(
     problem: Problem,
     work: Workspace,
     solver: Solver,
+    grippers: IntArray,
     goal: PlacedGoal,
     u: FloatArray,
     best: FloatArray,
     value: float,
 ) -> None:
     """Climb from the pose with parameters u to a better one; u and `best` follow."""
-    free, state, torso, g = problem.freedom, goal.state, goal.torso, goal.goal
-    body_A, form = problem.body_A[torso], free.form[g]
-    R_WG, p_WG = problem.goal_R[state, g], problem.goal_p[state, g]
-    R, p, trial = np.empty((3, 3)), np.empty(3), np.empty(PARAMETERS)
-    scale = 1.0
-    for _ in range(ROUNDS):
-        scale *= 0.5
+    free, g, trial = problem.freedom, goal.goal, np.empty(PARAMETERS)
+    for scale in SCALES:
         for parameter in range(PARAMETERS):
             step = scale * free.step[g, parameter]
             if step == 0.0:
@@ -311,14 +585,12 @@ def _refine(
                 for k in range(PARAMETERS):
                     trial[k] = u[k]
                 trial[parameter] += step if side == 0 else -step
-                clip(form, trial)
-                pose_of(form, trial, R_WG, p_WG, R, p)
-                if problem.joints > FEWEST_JOINTS and (
-                    gripper_contact_at(problem, work, state, R, p) != NO_CONTACT
-                ):
-                    continue
+                clip(free.form[g], trial)
                 least = NEAR * value
-                why, _ = score_pose(problem, work, body_A, state, torso, R, p, least, solver)
+                copy_joints(best, solver.best)
+                why, _ = _score_at(
+                    problem, work, solver, grippers, goal, NO_SAMPLE, trial, least, True
+                )
                 if why != REACHED:
                     continue
                 measure = measure_at(problem, solver.best)
@@ -343,41 +615,44 @@ def clip(form: FloatArray, u: FloatArray) -> None:
 
 
 @inner
-def progress_of(reason: int) -> int:
-    """Return how far a pose came: 0 out of reach, up to 4 for a contact of the arm."""
-    if reason == ARM_BLOCKED or reason == REACHED:
-        return 4
-    if reason == JOINT_LIMITS:
-        return 3
-    if reason == GRIPPER_BLOCKED_BY_ROBOT:
-        return 2
-    return 1 if reason == GRIPPER_BLOCKED_BY_ENVIRONMENT else 0
+def _reach_in_goal(problem: Problem, work: Workspace, goal: PlacedGoal) -> FloatArray:
+    """Return the bound of the arm's reach in the frame of the goal, shape (1 + slabs, 4).
 
-
-@inner
-def _pivot_in_goal(problem: Problem, work: Workspace, goal: PlacedGoal, pivot: FloatArray) -> None:
-    """Fill the position of the pivot in the frame of the goal [m], shape (3,)."""
+    The first row is the pivot and the greatest distance from it; the others are the slabs.
+    """
     R_WG, p_WG = problem.goal_R[goal.state, goal.goal], problem.goal_p[goal.state, goal.goal]
     pose_in_arm_base(problem, work, goal.torso, R_WG, p_WG)
-    R, p, at = work.R_AG, work.p_AG, problem.freedom.reach.pivot
+    R, p, reach = work.R_AG, work.p_AG, problem.freedom.reach
+    found = np.empty((1 + len(reach.slabs), 4))
     for k in range(3):
-        pivot[k] = 0.0
+        found[0, k] = 0.0
         for r in range(3):
-            pivot[k] += R[r, k] * (at[r] - p[r])
+            found[0, k] += R[r, k] * (reach.pivot[r] - p[r])
+    found[0, 3] = reach.span
+    for n in range(len(reach.slabs)):
+        for k in range(3):
+            found[1 + n, k] = 0.0
+            for r in range(3):
+                found[1 + n, k] += R[r, k] * reach.slabs[n, r]
+        found[1 + n, 3] = reach.slabs[n, 3]
+    return found
 
 
 @inner
-def _is_out_of_span(problem: Problem, pivot: FloatArray, g: int) -> bool:
-    """Return whether the wrist is out of reach at every pose of a goal."""
-    free = problem.freedom
-    half = free.form[g, HALF : HALF + 3]
-    return norm(pivot) > free.reach.span + norm(half) + norm(free.reach.wrist)
+def _reach_of(reach: FloatArray, at: FloatArray, radius: float) -> int:
+    """Return TOO_FAR or JOINT_LIMITS if a wrist is out of reach, by what bounds it, else REACHED.
 
-
-@inner
-def _is_within_reach(free: FreeGoals, pose: int, pivot: FloatArray) -> bool:
-    """Return whether the wrist is within reach of the pivot at a pose, by its row."""
-    x = free.wrist[pose, 0] - pivot[0]
-    y = free.wrist[pose, 1] - pivot[1]
-    z = free.wrist[pose, 2] - pivot[2]
-    return x * x + y * y + z * z <= free.reach.span * free.reach.span
+    Args:
+        reach: From `_reach_in_goal`.
+        at: Position of the wrist in the frame of the goal [m], shape (3 or more,).
+        radius: How far from there it may be [m].
+    """
+    x, y, z = at[0] - reach[0, 0], at[1] - reach[0, 1], at[2] - reach[0, 2]
+    span = reach[0, 3] + radius
+    if x * x + y * y + z * z > span * span:
+        return TOO_FAR
+    for n in range(1, len(reach)):
+        along = reach[n, 0] * x + reach[n, 1] * y + reach[n, 2] * z
+        if abs(along) > reach[n, 3] + radius:
+            return JOINT_LIMITS
+    return REACHED

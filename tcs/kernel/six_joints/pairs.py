@@ -82,11 +82,29 @@ def score_pair(
     Returns:
         Reason and contact code, that of the solution with the highest measure.
     """
+    return quick_look(problem, work, body_A, TRIED, solver)
+
+
+@inner
+def quick_look(
+    problem: Problem, work: Workspace, body_A: FloatArray, least: float, solver: SixJointSolver
+) -> tuple[int, int]:
+    """Score one goal as `score_pair`, leaving out solutions whose measure is not above a bound.
+
+    Args:
+        problem: The scene.
+        work: Workspace with environment, base, gripper and goal in place.
+        body_A: The robot's other shapes in A at the current torso level.
+        least: The bound; negative for none.
+        solver: As for `score_pair`.
+    """
     count, first_contact = solver.kept[0], NO_CONTACT
     for n in range(count):
         solver.measure[n] = measure_at(problem, solver.solutions[n])
     for tries in range(count):
         top = np.argmax(solver.measure[:count])
+        if solver.measure[top] <= least:
+            break
         q = solver.solutions[top]
         contact = arm_contact(problem, work, body_A, q)
         if contact == NO_CONTACT and at_goal(problem, work):

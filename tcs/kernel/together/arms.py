@@ -118,15 +118,26 @@ class TwoArms:
     ) -> tuple[FloatArray, FloatArray]:
         """Return free postures of an arm by itself at a goal, the best first, and measures."""
         problem, work = self.problems[k], self.works[k]
-        free = problem.freedom
-        R, p = problem.goal_R[row.state[0], goal], problem.goal_p[row.state[0], goal]
-        offsets = np.zeros((1, 6))
-        if free.first.size and np.any(free.form[goal]):
-            begin = free.start[goal]
-            offsets = free.u[begin : begin + free.first[goal + 1] - free.first[goal]]
-            samples = max(SAMPLES_OF_FREE_GOALS, samples // len(offsets))
-        form = free.form[goal] if free.first.size else np.zeros(15)
         parts = [known] if len(known) else []
+        for pose in problem.poses_of(goal):
+            parts += self._postures_at(problem, work, row, pose, samples)
+        postures = np.concatenate(parts) if parts else np.empty((0, 7))
+        measures = measures_of(problem, postures)
+        order = np.argsort(-measures, kind="stable")
+        return np.ascontiguousarray(postures[order]), measures[order]
+
+    def _postures_at(
+        self, problem: Problem, work: Workspace, row: Rows, pose: int, samples: int
+    ) -> list[FloatArray]:
+        """Return free postures of an arm by itself at the samples of a pose, shapes (n, 7)."""
+        free = problem.freedom
+        R, p = problem.goal_R[row.state[0], pose], problem.goal_p[row.state[0], pose]
+        offsets, form = np.zeros((1, 6)), np.zeros(15)
+        if free.first.size:
+            offsets, form = free.samples(pose), free.form[pose]
+        if len(offsets) > 1:
+            samples = max(SAMPLES_OF_FREE_GOALS, samples // len(offsets))
+        parts = []
         for u in offsets:
             if not place_gripper_pose(problem, work, row, form, u, R, p):
                 continue
@@ -136,10 +147,7 @@ class TwoArms:
                 tried = postures_at(problem, work.R_AG, work.p_AG, samples)
             kept = keep_free(problem, work, int(row.torso[0]), tried)
             parts.append(tried[:kept])
-        postures = np.concatenate(parts) if parts else np.empty((0, 7))
-        measures = measures_of(problem, postures)
-        order = np.argsort(-measures, kind="stable")
-        return np.ascontiguousarray(postures[order]), measures[order]
+        return parts
 
 
 def six_joint_postures(problem: Problem, work: Workspace) -> FloatArray:

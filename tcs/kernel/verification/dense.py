@@ -60,7 +60,7 @@ def dense_scans(
     where a joint moves farther than COARSE from one to the next. Solutions within the joint limits
     are checked for contacts in descending order of their measure; the best one is not refined.
     Without a closed form, `numeric_dense_scans` is used; for six joints, `six_joint_scans`. A goal
-    with freedom is scanned at many of its poses (`free_scans`).
+    of several poses, or with freedom, is scanned at many of them (`free_scans`).
     Contacts of base and gripper with the environment are not checked. The GIL is released.
 
     Args:
@@ -72,7 +72,7 @@ def dense_scans(
             a closed form.
         joints: Filled with the joint angles of each solution [rad], shape (n, 7).
     """
-    if problem.freedom.first.size:
+    if problem.freedom.first.size or problem.first_pose.size:
         return free_scans(problem, rows, pairs, samples, joints)
     if problem.joints == 6:
         return six_joint_scans(problem, rows, pairs, joints)

@@ -78,11 +78,17 @@ def at_poses(problem: Problem, state: int, goal: int) -> Problem:
         state: The environment state from which the goal is taken.
         goal: The goal.
     """
-    R_GT, p_GT = drawn_poses(problem.freedom.form[goal])
-    R_WG, p_WG = problem.goal_R[state, goal], problem.goal_p[state, goal]
+    drawn = []
+    for pose in problem.poses_of(goal):
+        R_GT, p_GT = np.eye(3)[None], np.zeros((1, 3))
+        if problem.freedom.first.size:
+            R_GT, p_GT = drawn_poses(problem.freedom.form[pose])
+        R_WG, p_WG = problem.goal_R[state, pose], problem.goal_p[state, pose]
+        drawn.append((R_WG @ R_GT, p_WG + p_GT @ R_WG.T))
+    R, p = (np.concatenate(parts) for parts in zip(*drawn, strict=True))
     states = len(problem.goal_R)
-    R, p = R_WG @ R_GT, p_WG + p_GT @ R_WG.T
     return problem._replace(
+        first_pose=np.empty(0, np.int64),
         goal_R=np.ascontiguousarray(np.repeat(R[None], states, axis=0)),
         goal_p=np.ascontiguousarray(np.repeat(p[None], states, axis=0)),
         freedom=_turning(problem, len(R)) if problem.joints == FEWEST_JOINTS else no_freedom(),
@@ -95,13 +101,18 @@ def _turning(problem: Problem, count: int) -> FreeGoals:
     form[:, AXIS : AXIS + 3], form[:, FOLD] = problem.turn, 1.0
     return no_freedom()._replace(
         form=form,
+        turned=np.zeros(count, np.bool_),
         step=np.zeros((count, PARAMETERS)),
+        fallback=np.full(count, -1),
         first=np.arange(count + 1),
+        codes=np.arange(count + 1),
         start=np.zeros(count, np.int64),
         parents=np.zeros((1, 2), np.int64),
         child_first=np.zeros(2, np.int64),
         u=np.zeros((1, PARAMETERS)),
         wrist=np.zeros((1, 3)),
+        is_tried=np.ones(1, np.bool_),
+        around=np.zeros((count, 4)),
         reach=problem.freedom.reach,
     )
 
@@ -109,7 +120,7 @@ def _turning(problem: Problem, count: int) -> FreeGoals:
 def free_scans(
     problem: Problem, rows: Rows, pairs: IntArray, samples: int, joints: FloatArray
 ) -> NDArray[np.float64]:
-    """Return the dexterity of the best collision-free sample over the freedom of each goal.
+    """Return the dexterity of the best collision-free sample over the poses of each goal.
 
     The arguments are those of `dense_scans`; `samples` is divided by 8, because neighbouring poses
     have neighbouring solutions. An arm of six joints has all its solutions at each pose, those of
@@ -122,8 +133,10 @@ def free_scans(
     for i, (row, goal) in enumerate(pairs):
         at = rows.at(slice(row, row + 1))
         state = int(at.state[0])
-        if problem.joints == FEWEST_JOINTS and not np.any(problem.freedom.step[goal]):
-            values[i] = five_joint_scan(problem, at, int(goal), joints[i])
+        (first, *others) = problem.poses_of(int(goal))
+        is_one = problem.joints == FEWEST_JOINTS and not others
+        if is_one and not np.any(problem.freedom.step[first]):
+            values[i] = five_joint_scan(problem, at, first, joints[i])
             continue
         posed = at_poses(problem, state, int(goal))
         if problem.joints < 7:

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from tcs.kernel.arrays import FloatArray, GridArrays, SceneArrays
 from tcs.kernel.dexterity import DEFAULT_MEASURE
-from tcs.kernel.freedom.forms import AXIS, FOLD, HALF, ROTATES, TILT
+from tcs.kernel.freedom.forms import AXIS, COLUMNS, FOLD, HALF, ROTATES, TILT
 from tcs.kernel.freedom.goals import FreeGoals
 from tcs.kernel.scores import REACHED
 from tcs.kernel.verification.reference import Pose, compose, inverse, link_poses
@@ -36,19 +36,19 @@ def free_score(
     free: FreeGoals,
     measure: str = DEFAULT_MEASURE,
 ) -> Verdict:
-    """Return the best verdict over the samples of a goal's freedom, without refinement.
+    """Return the best verdict over the samples of the poses of a goal, without refinement.
 
     If no sample reaches the goal, the verdict is that of the last sample.
     """
     best = None
-    for n in range(free.first[goal + 1] - free.first[goal]):
-        verdict = score(
-            at_offset(scene, goal, offset(free.form[goal], free.u[free.start[goal] + n])),
-            grid,
-            h,
-            goal,
-            measure,
-        )
+    posed = []
+    for pose in scene.poses_of(goal):
+        tools = [(np.eye(3), np.zeros(3))]
+        if free.first.size:
+            tools = [offset(free.form[pose], u) for u in free.samples(pose)]
+        posed += [(at_offset(scene, pose, tool), pose) for tool in tools]
+    for single, pose in posed:
+        verdict = score(single, grid, h, pose, measure)
         is_better = verdict.reason == REACHED and (
             best is None or best.reason != REACHED or verdict.dexterity > best.dexterity
         )
@@ -59,7 +59,7 @@ def free_score(
 
 
 def at_offset(scene: SceneArrays, goal: int, X_GT: Pose) -> SceneArrays:
-    """Return the scene with one goal moved by X_GT, and nothing free.
+    """Return the scene whose goals are all poses, one of them moved by X_GT, and nothing free.
 
     An arm of five joints keeps the freedom, of which it needs the rotation.
     """
@@ -67,7 +67,7 @@ def at_offset(scene: SceneArrays, goal: int, X_GT: Pose) -> SceneArrays:
     for state in range(len(R)):
         R[state, goal], p[state, goal] = compose((R[state, goal], p[state, goal]), X_GT)
     freedom = scene.freedom if scene.chain.joints == 5 else scene.freedom[:0]
-    return scene._replace(goal_R=R, goal_p=p, freedom=freedom)
+    return scene._replace(goal_R=R, goal_p=p, freedom=freedom, first_pose=scene.first_pose[:0])
 
 
 def is_served(scene: SceneArrays, grid: GridArrays, h: int, goal: int, q: FloatArray) -> bool:
@@ -75,10 +75,18 @@ def is_served(scene: SceneArrays, grid: GridArrays, h: int, goal: int, q: FloatA
 
     Joint angles are float32: the tolerances are those of `reference_pairs.confirms`.
     """
+    return any(_is_served_at(scene, grid, h, pose, q) for pose in scene.poses_of(goal))
+
+
+def _is_served_at(scene: SceneArrays, grid: GridArrays, h: int, goal: int, q: FloatArray) -> bool:
+    """Return what `is_served` does, for one pose."""
     placed, blocked = placed_scene(scene, grid, h, goal)
     X_AT = link_poses(scene.chain, q)[-1]
     R, p = compose(inverse(placed.X_AG), X_AT)
-    form = scene.freedom[goal]
+    form = scene.freedom[goal].copy() if len(scene.freedom) else np.zeros(COLUMNS)
+    if not np.any(form[AXIS : AXIS + 3]):
+        # Nothing is free, about any axis.
+        form[AXIS] = 1.0
     at_goal = bool(np.all(np.abs(p) <= form[HALF : HALF + 3] + 2e-6))
     if form[TILT] < math.pi or not form[ROTATES]:
         axis = form[AXIS : AXIS + 3]
