@@ -125,7 +125,8 @@ class ScenePostures:
             ]
             frames.append([_plain(X) for X in poses])
         goals = [
-            [*X.translation(), *X.rotation().matrix()[:, 0]] for X in goal_poses(scene, shown.task)
+            [*X.translation(), *X.rotation().matrix()[:, 0]]
+            for X in goal_poses(scene, shown.task, goal)
         ]
         return {
             "configuration": index,

@@ -75,7 +75,7 @@ def label(
     grid = lowered.grid._replace(environment_states=task.height.count)
     problem = build_problem(arrays)
     states, x, y = task.height.count, task.base_x.count, task.base_y.count
-    goals = problem.goal_p.shape[1]
+    goals = problem.goals
     found = np.empty((states * x * y, goals), np.bool_)
     grippers = gripper_contacts(problem)
     done = 0

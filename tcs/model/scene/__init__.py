@@ -20,6 +20,7 @@ from tcs.model.scene.environment.error_distribution import ErrorDistribution
 from tcs.model.scene.environment.shapes import environment_shapes
 from tcs.model.scene.lowered_scene import LoweredScene, without_bodies
 from tcs.model.scene.lowering import (
+    alternative_poses,
     arm_chain,
     environment_at,
     goal_poses,
@@ -51,6 +52,7 @@ __all__ = [
     "Posture",
     "Scene",
     "SceneSpec",
+    "alternative_poses",
     "arm_chain",
     "axis_of_turn",
     "body_frame_positions",

@@ -97,9 +97,10 @@ def _flat(item: object) -> Iterator[object]:
         # Scenes of revolute joints keep the digests that files were written with.
         absent = {"slides", "coupled"} | ({"joints"} if item.joints == 7 else set())
     if isinstance(item, SceneArrays):
-        # So do scenes without free goals, tables of distances, and rest postures.
+        # So do scenes without free goals, alternatives, tables of distances, and rest postures.
         counts = {
             "freedom": len(item.freedom),
+            "first_pose": len(item.first_pose),
             "distances": len(item.distances.corners),
             "rest": len(item.rest),
         }

@@ -17,6 +17,7 @@ from tcs.kernel.arrays import (
     Chain,
     FloatArray,
     GridArrays,
+    IntArray,
     SceneArrays,
     Shapes,
 )
@@ -33,6 +34,8 @@ from tcs.model.tasks import Task
 
 JOINTS = 7
 """Joints of the kernel's chain."""
+NEAR_BY_ANGLE = 0.1
+"""Distance that counts as much as an angle, between poses of a goal [m/rad]: a hand's length."""
 
 
 def lower(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
@@ -104,6 +107,7 @@ def _lowered(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
         goal_R=_rotations(goal_matrices),
         goal_p=_origins(goal_matrices),
         freedom=freedom_rows(task, chain, scene.spec.robot.name),
+        first_pose=_first_poses(task),
         distances=_distances(scene, robot_bodies),
         rest=_rest(scene),
     )
@@ -122,6 +126,13 @@ def _lowered(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
         environment_bodies=environment_bodies,
         goals=() if task is None else tuple(f"{task.name} {i}" for i in range(len(task.goals))),
     )
+
+
+def _first_poses(task: Task | None) -> IntArray:
+    """Return the first pose of each goal, then their number; empty if each goal is one pose."""
+    counts = [] if task is None else [len(goal.poses) for goal in task.goals]
+    several = any(count > 1 for count in counts)
+    return np.cumsum([0, *counts], dtype=np.int64) if several else np.empty(0, np.int64)
 
 
 def _rest(scene: Scene) -> FloatArray:
@@ -292,7 +303,7 @@ def _environment_states(
     M is W, or the frame of the robot's mount: in either the base moves in the x-y plane.
 
     Returns:
-        Shapes (states, parts, 3, 4) and (states, goals, 3, 4).
+        Shapes (states, parts, 3, 4) and (states, poses, 3, 4).
     """
     of_parts = scene.attached(Group.ENVIRONMENT)
     of_goals = AttachedPoses.of([] if task is None else _goals_in_frames(scene, task))
@@ -321,20 +332,46 @@ def _seen_from_mount(scene: Scene, X_WF: FloatArray) -> FloatArray:
     return np.asarray(X_MF)
 
 
-def goal_poses(scene: Scene, task: Task) -> list[RigidTransform]:
-    """Return X_WG of every goal of a task, at the scene's current state.
+def goal_poses(scene: Scene, task: Task, served: int | None = None) -> list[RigidTransform]:
+    """Return X_WG of every goal of a task, of its first pose, at the scene's current state.
+
+    Args:
+        scene: The scene.
+        task: The task.
+        served: Number of a goal that the arm is at: of its poses, the nearest to the tool is taken.
 
     Raises:
         UnknownNameError: If the environment lacks the body frame of a goal.
     """
-    return [
+    poses = alternative_poses(scene, task)
+    found = [of_goal[0] for of_goal in poses]
+    if served is not None and len(poses[served]) > 1:
+        X_WT = scene.tool_pose()
+
+        def apart(X_WG: RigidTransform) -> float:
+            X_TG = X_WT.inverse() @ X_WG
+            angle = float(X_TG.rotation().ToAngleAxis().angle())
+            return float(np.linalg.norm(X_TG.translation())) + NEAR_BY_ANGLE * angle
+
+        found[served] = min(poses[served], key=apart)
+    return found
+
+
+def alternative_poses(scene: Scene, task: Task) -> list[list[RigidTransform]]:
+    """Return X_WG of all poses of every goal of a task, at the scene's current state.
+
+    Raises:
+        UnknownNameError: If the environment lacks the body frame of a goal.
+    """
+    found = iter(
         frame.CalcPoseInWorld(scene.plant_context) @ X_HG
         for frame, X_HG in _goals_in_frames(scene, task)
-    ]
+    )
+    return [list(itertools.islice(found, len(goal.poses))) for goal in task.goals]
 
 
 def _goals_in_frames(scene: Scene, task: Task) -> list[tuple[Frame, RigidTransform]]:
-    """Return the body frame H of each goal, and the goal's pose X_HG in it.
+    """Return the body frame H of each pose of the goals, and the pose X_HG in it.
 
     Raises:
         UnknownNameError: If the environment has no such body frame.
@@ -342,11 +379,13 @@ def _goals_in_frames(scene: Scene, task: Task) -> list[tuple[Frame, RigidTransfo
     frames = scene.built.body_frames
     found = []
     for i, goal in enumerate(task.goals):
-        if goal.body_frame not in frames:
-            where = f"task '{task.name}', goal {i + 1}, environment '{scene.spec.environment.name}'"
-            raise UnknownNameError("frame", goal.body_frame, frames, where=where)
-        X_HG = RigidTransform(Quaternion(goal.quaternion), goal.position)
-        found.append((frames[goal.body_frame], X_HG))
+        for pose in goal.poses:
+            if pose.body_frame not in frames:
+                named = f"task '{task.name}', goal {i + 1}"
+                where = f"{named}, environment '{scene.spec.environment.name}'"
+                raise UnknownNameError("frame", pose.body_frame, frames, where=where)
+            X_HG = RigidTransform(Quaternion(pose.quaternion), pose.position)
+            found.append((frames[pose.body_frame], X_HG))
     return found
 
 

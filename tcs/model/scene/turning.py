@@ -23,7 +23,7 @@ POSTURES = 50
 
 
 def freedom_rows(task: Task | None, chain: Chain, robot: str) -> NDArray[np.float64]:
-    """Return what is free about each goal of a task, as the kernel reads it.
+    """Return what is free about each pose of the goals of a task, as the kernel reads it.
 
     Args:
         task: The task, None for none.
@@ -31,7 +31,7 @@ def freedom_rows(task: Task | None, chain: Chain, robot: str) -> NDArray[np.floa
         robot: Name of the robot, for messages.
 
     Returns:
-        Shape (goals, COLUMNS), without rows if nothing is free. With an arm of five joints, goals
+        Shape (poses, COLUMNS), without rows if nothing is free. With an arm of five joints, goals
         with any orientation name the axis that the others leave free.
 
     Raises:
@@ -40,12 +40,12 @@ def freedom_rows(task: Task | None, chain: Chain, robot: str) -> NDArray[np.floa
     if task is None:
         return np.empty((0, COLUMNS))
     turn = axis_of_turn(task, chain, robot)
-    if turn is None and not task.has_freedom:
+    if turn is None and all(pose.free is None for pose in task.poses):
         return np.empty((0, COLUMNS))
-    rows = np.zeros((len(task.goals), COLUMNS))
-    for row, goal in zip(rows, task.goals, strict=True):
-        if goal.free is not None:
-            row[:] = goal.free.row()
+    rows = np.zeros((len(task.poses), COLUMNS))
+    for row, pose in zip(rows, task.poses, strict=True):
+        if pose.free is not None:
+            row[:] = pose.free.row()
         if turn is not None:
             row[:3] = turn
     return rows
@@ -68,9 +68,9 @@ def axis_of_turn(task: Task, chain: Chain, robot: str) -> Vector | None:
     """
     if chain.joints != 5:
         return None
-    named: dict[int, Vector] = {}
-    for i, goal in enumerate(task.goals):
-        free = goal.free
+    named: list[tuple[int, Vector]] = []
+    numbered = [(i, pose.free) for i, goal in enumerate(task.goals) for pose in goal.poses]
+    for i, free in numbered:
         if free is None or not free.rotates:
             raise TaskError(
                 f"task '{task.name}', goal {i + 1}: the arm of robot '{robot}' has five joints and "
@@ -78,18 +78,18 @@ def axis_of_turn(task: Task, chain: Chain, robot: str) -> Vector | None:
                 "Add 'free: {rotation_about: [x, y, z]}' or 'free: orientation' to the goal."
             )
         if not free.is_any_orientation:
-            named[i] = free.axis
-    first = next(iter(named), None)
-    for i, axis in named.items():
-        if first is not None and np.linalg.norm(np.cross(axis, named[first])) > PARALLEL:
+            named.append((i, free.axis))
+    for i, axis in named[1:]:
+        first, of_first = named[0]
+        if np.linalg.norm(np.cross(axis, of_first)) > PARALLEL:
             raise TaskError(
                 f"task '{task.name}': goal {first + 1} leaves the rotation about "
-                f"{axis_name(named[first])} free and goal {i + 1} that about "
+                f"{axis_name(of_first)} free and goal {i + 1} that about "
                 f"{axis_name(axis)}, but an "
                 f"arm of five joints, as of robot '{robot}', needs the same axis at all goals. "
                 "Score them as two tasks."
             )
-    axis = _least_like_a_joint(chain) if first is None else named[first]
+    axis = named[0][1] if named else _least_like_a_joint(chain)
     try:
         turned_arm(chain, np.array(axis))
     except ArmClassError as error:

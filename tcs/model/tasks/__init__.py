@@ -9,13 +9,14 @@ from tcs.model.tasks.files import load_task, task_names
 from tcs.model.tasks.freedom import Freedom
 from tcs.model.tasks.hand import Hand, partners
 from tcs.model.tasks.surface import Surface
-from tcs.model.tasks.task import TOOL_SPEED, Goal, KeepOut, Task
+from tcs.model.tasks.task import TOOL_SPEED, Goal, GoalPose, KeepOut, Task
 from tcs.model.tasks.tool_line import ToolLine
 
 __all__ = [
     "TOOL_SPEED",
     "Freedom",
     "Goal",
+    "GoalPose",
     "Hand",
     "KeepOut",
     "Surface",

@@ -17,9 +17,11 @@ from tcs.files.paths import DataFiles, expanded, is_path
 from tcs.model.tasks.freedom import Freedom
 from tcs.model.tasks.hand import partners
 from tcs.model.tasks.surface import Surface
-from tcs.model.tasks.task import Goal, KeepOut, Task
+from tcs.model.tasks.task import Goal, GoalPose, KeepOut, Task
 from tcs.model.tasks.tool_line import DEFAULT_APPROACH, ToolLine
 
+POSE = ("body_frame", "position", "quaternion_wxyz")
+"""Keys that a pose needs."""
 TASKS = DataFiles("task", "tasks/*/*.yaml")
 
 
@@ -60,15 +62,21 @@ class FreeEntry(_Entry):
     position: list[float] | None = None
 
 
-class GoalEntry(_Entry):
+class PoseEntry(_Entry):
+    """A pose at which a goal is reached; what an alternative leaves out is that of its goal."""
+
+    body_frame: str | None = None
+    position: list[float] | None = None
+    quaternion_wxyz: list[float] | None = None
+    free: Literal["orientation", "nothing"] | FreeEntry | None = None
+
+
+class GoalEntry(PoseEntry):
     """One goal of a task file."""
 
-    body_frame: str
-    position: list[float]
-    quaternion_wxyz: list[float]
+    alternatives: list[PoseEntry] | None = None
     weight: float = 1.0
     name: str = ""
-    free: Literal["orientation", "nothing"] | FreeEntry | None = None
     arm: str = ""
     tool: str = ""
     together_with: str = ""
@@ -236,18 +244,67 @@ def _tool_file(name: str, tool: str, task: Path) -> str:
 
 def _goal(entry: GoalEntry, task: TaskFile) -> Goal:
     approach, retreat = _lines(entry, task)
+    poses = _poses(entry, task)
     return Goal(
-        body_frame=entry.body_frame,
-        position=np.array(entry.position, dtype=np.float64),
-        quaternion=np.array(entry.quaternion_wxyz, dtype=np.float64),
+        body_frame=poses[0].body_frame,
+        position=poses[0].position,
+        quaternion=poses[0].quaternion,
         weight=entry.weight,
         name=entry.name,
-        free=_freedom(entry.free if entry.free is not None else task.free),
+        free=poses[0].free,
+        alternatives=tuple(poses[1:]),
         arm=entry.arm,
         tool=entry.tool,
         together_with=entry.together_with,
         approach=approach,
         retreat=retreat,
+    )
+
+
+def _poses(entry: GoalEntry, task: TaskFile) -> list[GoalPose]:
+    """Return the poses of a goal: its own, if it is whole, and its alternatives.
+
+    Raises:
+        TaskError: If there is none, or a value is missing or invalid.
+    """
+    alone = entry.alternatives is None
+    missing = [key for key in POSE if getattr(entry, key) is None]
+    if alone and missing:
+        raise TaskError(
+            f"field '{missing[0]}' is missing. A goal needs {', '.join(POSE)}, or a list of poses, "
+            "'alternatives'."
+        )
+    if entry.alternatives is not None and not entry.alternatives:
+        raise TaskError("field 'alternatives' is empty. List poses, or leave it out.")
+    poses = [] if missing else [_pose(entry, entry, task)]
+    for i, other in enumerate(entry.alternatives or ()):
+        try:
+            poses.append(_pose(other, entry, task))
+        except TaskError as error:
+            raise TaskError(f"alternatives[{i}]: {error}") from None
+    return poses
+
+
+def _pose(entry: PoseEntry, goal: GoalEntry, task: TaskFile) -> GoalPose:
+    """Return a pose of a goal, with what its entry leaves out taken from that of the goal.
+
+    Raises:
+        TaskError: If a value is missing in both, or invalid.
+    """
+    given = {}
+    for key in POSE:
+        own = getattr(entry, key)
+        given[key] = getattr(goal, key) if own is None else own
+        if given[key] is None:
+            raise TaskError(
+                f"field '{key}' is missing. Give it here, or to the goal for all poses."
+            )
+    frees = (entry.free, goal.free, task.free)
+    return GoalPose(
+        body_frame=given["body_frame"],
+        position=np.array(given["position"], dtype=np.float64),
+        quaternion=np.array(given["quaternion_wxyz"], dtype=np.float64),
+        free=_freedom(next((free for free in frees if free is not None), None)),
     )
 
 

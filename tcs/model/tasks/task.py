@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,9 @@ MAX_DISTANCE = 2.0
 
 LONGEST_NAME = 60
 """Greatest length of the name of a goal [characters]: it has to fit into a table."""
+
+MOST_POSES = 100
+"""Greatest number of poses of one goal; each takes the time of a goal of its own."""
 
 TOOL_SPEED = 0.1
 """Speed of the tool on straight motions [m/s], at which the velocity limits must be kept: a hand's
@@ -60,8 +63,8 @@ class KeepOut:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Goal:
-    """A goal pose of the tool frame T, fixed to a body frame H.
+class GoalPose:
+    """A pose of the tool frame T at which a goal is reached, fixed to a body frame H.
 
     In T, x points forward out of the fingers, and y along their opening direction.
     """
@@ -72,22 +75,8 @@ class Goal:
     """p_HoGo_H: position of the goal in H [m], shape (3,)."""
     quaternion: NDArray[np.float64]
     """R_HG: orientation of the goal in H, unit quaternion wxyz, shape (4,)."""
-    weight: float = 1.0
-    """Weight of this goal relative to the others; `Task.weights` sums to 1."""
-    approach: ToolLine = DEFAULT_APPROACH
-    """Straight motion that ends at the goal."""
-    retreat: ToolLine = DEFAULT_RETREAT
-    """Straight motion that begins at the goal."""
-    name: str = ""
-    """Where the goal is, as people say it, e.g. "left cheek"; "" for no name."""
     free: Freedom | None = None
-    """Tool poses that serve as well as the nominal one, None for none."""
-    arm: str = ""
-    """Name of the arm that reaches it, as the robot file names its arms; "" for the scored one."""
-    tool: str = ""
-    """Name of the tool that it needs, one of `Task.tools` or one that ships; "" for none."""
-    together_with: str = ""
-    """Name of the goal that another arm reaches at the same time; "" for none."""
+    """Tool poses that serve as well as this one, None for none."""
 
     def __post_init__(self) -> None:
         """Check each value, normalise the quaternion, and make the arrays read-only.
@@ -98,11 +87,6 @@ class Goal:
         """
         if not self.body_frame:
             raise TaskError("field 'body_frame' is empty. Name a body frame, e.g. 'head'.")
-        if len(self.name) > LONGEST_NAME or not all(c.isprintable() for c in self.name):
-            raise TaskError(
-                f"field 'name' is {self.name[:LONGEST_NAME]!r}, but must be at most {LONGEST_NAME} "
-                "printable characters, e.g. 'left cheek'."
-            )
         position = finite("position", self.position, ("x", "y", "z"))
         # Unlike numpy's norm, this does not overflow, for which numpy would print a warning.
         distance = math.hypot(*position)
@@ -118,32 +102,102 @@ class Goal:
                 f"field 'quaternion_wxyz' has length {length:.6g}, but must be a unit quaternion "
                 f"(1 within {UNIT_TOLERANCE:g})."
             )
-        WEIGHT.check(self.weight, "field 'weight'", TaskError)
         quaternion = quaternion / length
         for array in (position, quaternion):
             array.flags.writeable = False
         object.__setattr__(self, "position", position)
         object.__setattr__(self, "quaternion", quaternion)
-        object.__setattr__(self, "weight", float(self.weight))
 
     def __eq__(self, other: object) -> bool:
-        return self._key() == other._key() if isinstance(other, Goal) else NotImplemented
+        if not isinstance(other, GoalPose) or type(self) is not type(other):
+            return NotImplemented
+        return self._key() == other._key()
 
     def __hash__(self) -> int:
         return hash(self._key())
 
     def _key(self) -> tuple[object, ...]:
         position, quaternion = self.position.tolist(), self.quaternion.tolist()
-        others = (self.weight, self.approach, self.retreat, self.name, self.free)
-        return (
-            self.body_frame,
-            *position,
-            *quaternion,
-            *others,
-            self.arm,
-            self.tool,
-            self.together_with,
+        return self.body_frame, *position, *quaternion, self.free
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Goal(GoalPose):
+    """A goal of the tool: its pose, or the first of several of which any one counts."""
+
+    weight: float = 1.0
+    """Weight of this goal relative to the others; `Task.weights` sums to 1."""
+    approach: ToolLine = DEFAULT_APPROACH
+    """Straight motion that ends at the goal."""
+    retreat: ToolLine = DEFAULT_RETREAT
+    """Straight motion that begins at the goal."""
+    name: str = ""
+    """Where the goal is, as people say it, e.g. "left cheek"; "" for no name."""
+    arm: str = ""
+    """Name of the arm that reaches it, as the robot file names its arms; "" for the scored one."""
+    tool: str = ""
+    """Name of the tool that it needs, one of `Task.tools` or one that ships; "" for none."""
+    together_with: str = ""
+    """Name of the goal that another arm reaches at the same time; "" for none."""
+    alternatives: tuple[GoalPose, ...] = ()
+    """Further poses: the goal is reached at any one of them."""
+
+    def __post_init__(self) -> None:
+        """Check each value as a pose does.
+
+        Raises:
+            TaskError: As of a pose, or if a name, weight or number of poses is out of its range.
+        """
+        GoalPose.__post_init__(self)
+        if len(self.name) > LONGEST_NAME or not all(c.isprintable() for c in self.name):
+            raise TaskError(
+                f"field 'name' is {self.name[:LONGEST_NAME]!r}, but must be at most {LONGEST_NAME} "
+                "printable characters, e.g. 'left cheek'."
+            )
+        WEIGHT.check(self.weight, "field 'weight'", TaskError)
+        if len(self.poses) > MOST_POSES:
+            raise TaskError(
+                f"field 'alternatives': the goal has {len(self.poses)} poses, but may have at most "
+                f"{MOST_POSES}. Say with 'free' what is free about one of them."
+            )
+        object.__setattr__(self, "weight", float(self.weight))
+
+    @property
+    def poses(self) -> tuple[GoalPose, ...]:
+        """All poses at which it is reached, the goal's own first."""
+        return (self, *self.alternatives)
+
+    def at(self, poses: Sequence[GoalPose]) -> Goal:
+        """Return the goal with other poses."""
+        first = poses[0]
+        return replace(
+            self,
+            body_frame=first.body_frame,
+            position=first.position,
+            quaternion=first.quaternion,
+            free=first.free,
+            alternatives=tuple(poses[1:]),
         )
+
+    @property
+    def region(self) -> str:
+        """What poses serve beside the goal's own one, in words; "" for none.
+
+        E.g. "any rotation about x", or "any of 2 poses, y within 20 deg at one of them".
+        """
+        frees = [str(pose.free) if pose.free is not None else "" for pose in self.poses]
+        if not self.alternatives:
+            return frees[0]
+        text = f"any of {len(frees)} poses"
+        if all(free == frees[0] for free in frees):
+            return f"{text}, {frees[0]} at each" if frees[0] else text
+        named = [f"{free} at pose {i + 1}" for i, free in enumerate(frees) if free]
+        return ", ".join([text, *named])
+
+    def _key(self) -> tuple[object, ...]:
+        others = (self.weight, self.approach, self.retreat, self.name)
+        hand = (self.arm, self.tool, self.together_with)
+        return *GoalPose._key(self), *others, *hand, self.alternatives
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -193,7 +247,7 @@ class Task:
         for name in self.environments:
             if self.environments.count(name) > 1:
                 raise TaskError(f"field 'environments': '{name}' is repeated. Remove one of them.")
-        frames = {goal.body_frame for goal in self.goals}
+        frames = {pose.body_frame for pose in self.poses}
         frames |= {name for surface in self.surfaces for name in surface.frames}
         for one in self.keep_out:
             if one.body_frame not in frames:
@@ -225,10 +279,16 @@ class Task:
         return found
 
     @property
+    def poses(self) -> tuple[GoalPose, ...]:
+        """The poses of all goals, those of one goal after those of the one before."""
+        return tuple(pose for goal in self.goals for pose in goal.poses)
+
+    @property
     def has_freedom(self) -> bool:
-        """Whether a goal is free."""
-        frees = [*(goal.free for goal in self.goals), *(one.free for one in self.surfaces)]
-        return any(free is not None for free in frees)
+        """Whether a goal is free: reached at more than one pose of the tool."""
+        frees = [*(pose.free for pose in self.poses), *(one.free for one in self.surfaces)]
+        several = any(goal.alternatives for goal in self.goals)
+        return several or any(free is not None for free in frees)
 
     def grid_changes(self, environment: str) -> Mapping[str, Mapping[str, object]]:
         """Return the changes to the axes of an environment's grid, empty if there are none."""

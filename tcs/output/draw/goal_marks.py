@@ -62,7 +62,8 @@ def draw_goal_marks(
         axes.text(
             at[0],
             at[1],
-            " ".join(str(marks[i].number + 1) for i in numbers),
+            # A goal may have several poses at one place.
+            " ".join(dict.fromkeys(str(marks[i].number + 1) for i in numbers)),
             color="white",
             fontsize=6.5 * size,
             ha="center",

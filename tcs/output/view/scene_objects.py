@@ -115,7 +115,7 @@ class SceneShapes:
         for body in {one.body for one in self._environment}:
             X_WL = plant.EvalBodyPoseInWorld(context, plant.get_body(body))
             poses[f"{ENVIRONMENT}/{int(body)}"] = X_WL
-        goals = goal_poses(scene, self.task)
+        goals = goal_poses(scene, self.task, None if joints is None else goal)
         poses |= {f"{GOALS}/{g}": X_WG for g, X_WG in enumerate(goals)}
         poses[SHOWN] = RigidTransform(goals[goal].translation())
         if scene.spec.environment.mount is not None:

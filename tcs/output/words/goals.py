@@ -147,9 +147,9 @@ def goals_text(goals: Sequence[int], names: Sequence[str] = ()) -> str:
 
 
 def goal_place(goal: Goal) -> str:
-    """Return where a goal is: its name, or its body frame in words; and what is free about it."""
+    """Return where a goal is: its name, or its body frame in words; and what else serves."""
     place = goal.name or frame_name(goal.body_frame)
-    return place if goal.free is None else f"{place} ({goal.free})"
+    return f"{place} ({goal.region})" if goal.region else place
 
 
 def goals_by_reason(reasons: Iterable[Reason]) -> Mapping[Reason, tuple[int, ...]]:

@@ -157,7 +157,7 @@ def _best(scorer: PoseScorer, scene: PoseScene, fineness: Fineness) -> list[Scor
     scores = scorer.score(values[few])
     counts = scores.reached.sum(axis=1)
     order = np.lexsort((-scores.dexterity.mean(axis=1), -counts))
-    goals = scorer.problem.goal_p.shape[1]
+    goals = scorer.problem.goals
     if counts[order[0]] == goals:
         found = [ScoredBase(values[few[i]], *(array[i] for array in scores)) for i in order]
     else:
@@ -172,7 +172,7 @@ def _refined(scorer: PoseScorer, starts: Sequence[tuple[int, ...]]) -> list[Scor
     The search sees a few tool poses; where others are missed from what it finds, it begins anew
     with more of them.
     """
-    goals, chosen = scorer.problem.goal_p.shape[1], np.empty(0, dtype=np.int64)
+    goals, chosen = scorer.problem.goals, np.empty(0, dtype=np.int64)
     missed = np.arange(goals)
     while True:
         p, R = scorer.problem.goal_p[0, missed], scorer.problem.goal_R[0, missed]

@@ -62,7 +62,7 @@ class PoseScorer:
 
     def score(self, points: FloatArray) -> PointScores:
         """Return the scores of base poses."""
-        count, goals = len(points), self.problem.goal_p.shape[1]
+        count, goals = len(points), self.problem.goals
         x, y, yaw = points[:, :3].T
         one = np.zeros(count, np.int64)
         rows, found = Rows(one, x, y, yaw, one), new_scores(count, goals)

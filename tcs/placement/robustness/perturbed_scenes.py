@@ -49,7 +49,7 @@ class HandScenes(NamedTuple):
 
     def scores(self, rows: Rows) -> Scores:
         """Return the scores of rows, computed by the code that scores a grid."""
-        scores = new_scores(len(rows.state), self.problem.goal_p.shape[1])
+        scores = new_scores(len(rows.state), self.problem.goals)
         score_rows(self.problem, self.grippers, rows, scores)
         if self.approaches is not None:
             self.approaches.score_rows(self.problem, rows, scores)

@@ -7,9 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from pydrake.math import RigidTransform
 
 from tcs.kernel.verification.reference import measured, prescribed
-from tcs.model.scene import Contact, NeighbourList, Scene, arm_chain, axis_of_turn, goal_poses
+from tcs.model.scene import (
+    Contact,
+    NeighbourList,
+    Scene,
+    alternative_poses,
+    arm_chain,
+    axis_of_turn,
+)
+from tcs.model.tasks import Freedom
 from tcs.placement.scoring.job import Job
 
 POSITION_BAR = 1e-6
@@ -52,6 +61,23 @@ class Finding:
             and self.limit_violations == 0
             and self.contacts == 0
         )
+
+
+def pose_errors(X_TG: RigidTransform, free: Freedom | None) -> tuple[float, float]:
+    """Return how far the tool T is from a pose G, or from the nearest one that serves as well.
+
+    Args:
+        X_TG: The pose, as the tool sees it.
+        free: What is free about it.
+
+    Returns:
+        Distance [m] and angle [rad].
+    """
+    if free is not None:
+        X_GT = X_TG.inverse()
+        return free.errors(X_GT.rotation().matrix(), X_GT.translation())
+    angle = float(X_TG.rotation().ToAngleAxis().angle())
+    return float(np.linalg.norm(X_TG.translation())), angle
 
 
 def of_both(first: Finding, second: Finding, value: float) -> Finding:
@@ -111,14 +137,17 @@ class DrakeChecker:
             scene.set_joint(name, at[name])
         q = q[-len(self._lower) :]
         scene.set_arm(q)
-        X_WT, X_WG = scene.tool_pose(), goal_poses(scene, self._job.task)[g]
-        X_TG = X_WT.inverse() @ X_WG
-        position = float(np.linalg.norm(X_TG.translation()))
-        rotation = float(X_TG.rotation().ToAngleAxis().angle())
-        free = self._job.task.goals[g].free
-        if free is not None:
-            X_GT = X_TG.inverse()
-            position, rotation = free.errors(X_GT.rotation().matrix(), X_GT.translation())
+        X_WT, task = scene.tool_pose(), self._job.task
+        errors = [
+            pose_errors(X_WT.inverse() @ X_WG, pose.free)
+            for pose, X_WG in zip(
+                task.goals[g].poses, alternative_poses(scene, task)[g], strict=True
+            )
+        ]
+        # The pose that serves is the one nearest to where the joints take the tool.
+        position, rotation = min(
+            errors, key=lambda e: max(e[0] / POSITION_BAR, e[1] / ROTATION_BAR)
+        )
         contacts = self._contacts()
         J = scene.tool_jacobian()
         if self._turn is not None:

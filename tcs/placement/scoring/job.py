@@ -283,7 +283,7 @@ def _of_hand(task: Task, numbers: Sequence[int], robot: RobotFile) -> Task:
     tools = {task.tools.get(goal.tool, goal.tool) for goal in task.goals if goal.tool}
     elsewhere = {load_tool(tool).name for tool in tools} - {body.name for body in robot.bodies}
     goals = tuple(task.goals[number] for number in numbers)
-    frames = {goal.body_frame for goal in goals}
+    frames = {pose.body_frame for goal in goals for pose in goal.poses}
     return dataclasses.replace(
         task,
         goals=goals,

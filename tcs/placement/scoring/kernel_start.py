@@ -66,7 +66,7 @@ def warm_up(
     quicken_flags()
     with announced(on_compile):
         with nullcontext() if approaches is None else approaches.compiled_beside():
-            nothing = new_scores(0, problem.goal_p.shape[1])
+            nothing = new_scores(0, problem.goals)
             score_rows(problem, gripper_contacts(problem), no_rows(), nothing)
         if approaches is not None:
             approaches.warm_up()

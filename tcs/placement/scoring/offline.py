@@ -18,7 +18,7 @@ from tcs.model.grid import Grid
 from tcs.model.people import PersonLike
 from tcs.model.robots import BOTH, RobotFile, arm_references
 from tcs.model.scene import EnvironmentFile, Scene, body_frame_positions
-from tcs.model.tasks import Task, ToolLine
+from tcs.model.tasks import Goal, Task, ToolLine
 from tcs.placement.constraints import (
     Constraints,
     Footprint,
@@ -360,7 +360,8 @@ def _task_as_dict(task: Task) -> dict[str, Any]:
                 "weight": goal.weight,
                 "approach": _line_as_dict(goal.approach),
                 "retreat": _line_as_dict(goal.retreat),
-                **({} if goal.free is None else {"free": str(goal.free)}),
+                **({"free": goal.region} if goal.region else {}),
+                **({"alternatives": _poses_as_dicts(goal)} if goal.alternatives else {}),
                 **({"arm": goal.arm} if goal.arm else {}),
                 **({"tool": goal.tool} if goal.tool else {}),
                 **({"together_with": goal.together_with} if goal.together_with else {}),
@@ -368,6 +369,19 @@ def _task_as_dict(task: Task) -> dict[str, Any]:
             for goal in task.goals
         ],
     }
+
+
+def _poses_as_dicts(goal: Goal) -> list[dict[str, Any]]:
+    """Return the poses of a goal beside its own as plain containers."""
+    return [
+        {
+            "body_frame": pose.body_frame,
+            "position": pose.position.tolist(),
+            "quaternion_wxyz": pose.quaternion.tolist(),
+            **({} if pose.free is None else {"free": str(pose.free)}),
+        }
+        for pose in goal.alternatives
+    ]
 
 
 def _line_as_dict(line: ToolLine) -> dict[str, Any]:

@@ -35,12 +35,14 @@ class Manifest:
     rest: str
     """Hash of everything but the goals."""
     goals: tuple[str, ...]
-    """Hash of each goal; () if one of them is free, as it is scored together with the others."""
+    """Hash of each goal; () if one of them is not a single pose: it is scored with the others."""
 
     @classmethod
     def of(cls, lowered: LoweredScene, measure: str, excluded: NDArray[np.bool_] | None) -> Self:
         """Return the manifest of a scene with its goals, and what else the scores follow from."""
-        goals = range(0 if len(lowered.arrays.freedom) else lowered.arrays.goal_p.shape[1])
+        arrays = lowered.arrays
+        are_poses = all(map(arrays.is_single_pose, range(arrays.goals)))
+        goals = range(arrays.goals if are_poses and not len(arrays.freedom) else 0)
         return cls(
             key=key_of(lowered, measure, excluded),
             rest=key_of(with_goals(lowered, []), measure, excluded),
@@ -72,12 +74,14 @@ class Manifest:
 
 
 def with_goals(lowered: LoweredScene, goals: Sequence[int]) -> LoweredScene:
-    """Return a scene with some of its goals, none of them free."""
+    """Return a scene with some of its goals, each a single pose."""
     some = np.asarray(goals, dtype=np.intp)
     arrays = lowered.arrays
     return replace(
         lowered,
-        arrays=arrays._replace(goal_R=arrays.goal_R[:, some], goal_p=arrays.goal_p[:, some]),
+        arrays=arrays._replace(
+            goal_R=arrays.goal_R[:, some], goal_p=arrays.goal_p[:, some], first_pose=some[:0]
+        ),
         goals=(),
     )
 

@@ -97,7 +97,7 @@ def sweep(
     problem = build_problem(lowered.arrays, measure)
     scorer = None if approaches is None else ApproachScorer(problem, approaches)
     start = KernelStart(lambda: [problem], on_compile, scorer)
-    size, goals = lowered.grid.size, problem.goal_p.shape[1]
+    size, goals = lowered.grid.size, problem.goals
     begun = time.perf_counter()
     reason: NDArray[np.uint8] = large_zeros((size, goals), np.uint8)
     contact: NDArray[Any] = large_zeros((size, goals), _code_type(problem))
@@ -192,7 +192,7 @@ def _opened(
 
 def _kept(opened: Blocks, problem: Problem) -> Kept:
     """Return the blocks of a problem in their folder."""
-    goals = problem.goal_p.shape[1]
+    goals = problem.goals
     return Kept(opened, goals=goals, joints=JOINTS, contacts=_codes(problem))
 
 

@@ -267,10 +267,7 @@ def _pairs_of_postures(
     """Return the best pair of postures of each configuration that reaches both goals."""
     two = hands.two(a.hand, b.hand)
     bodies = two.contacts(rows.torso, first, second)
-    is_posed = not any(
-        len(hands.lowered[hand].arrays.freedom) and np.any(hands.lowered[hand].arrays.freedom[goal])
-        for hand, goal in (a, b)
-    )
+    is_posed = all(hands.lowered[hand].arrays.is_single_pose(goal) for hand, goal in (a, b))
     found = []
     for n in range(len(rows.state)):
         if bodies[n, 0] < 0:

@@ -150,7 +150,7 @@ def test_unknown_task_gets_the_nearest_name():
         (
             "position:",
             "positoin:",
-            "field 'goals[0]': unknown key 'positoin'. Known: approach, arm, body_frame",
+            "field 'goals[0]': unknown key 'positoin'. Known: alternatives, approach, arm",
         ),
         ("weight: 2", "weigth: 2", "Did you mean 'weight'?"),
         ("position:", "position_mm:", "Did you mean 'position'?"),

@@ -13,7 +13,7 @@ from tcs.kernel.arrays import FloatArray
 from tcs.model.scene.environment.environment_file import EnvironmentFile
 from tcs.model.scene.person.resized import covers_of, padding_of, person_shapes, scales_of
 from tcs.model.scene.person.shapes import LinkShape
-from tcs.model.tasks import Goal, Task
+from tcs.model.tasks import GoalPose, Task
 
 CLEAR = 0.002
 """How much farther than the nearest shape of its link the others have to stay from a goal [m]."""
@@ -42,17 +42,18 @@ def goals_on_person(task: Task, environment: EnvironmentFile) -> Task:
     if not scales:
         return task
     shapes = person_shapes(environment)
-    goals = []
-    for goal in task.goals:
-        link = environment.body_frames.get(goal.body_frame, "")
+
+    def on_person(pose: GoalPose) -> GoalPose:
+        link = environment.body_frames.get(pose.body_frame, "")
         if link not in scales:
-            goals.append(goal)
-            continue
+            return pose
         grown = padding_of(environment, link, scales) - padding_of(environment, link, {})
         covers = covers_of(environment, link, shapes[link], scales[link])
-        position = Anchor.of(goal, shapes[link]).position(scales[link], covers, grown)
-        goals.append(dataclasses.replace(goal, position=position))
-    return dataclasses.replace(task, goals=tuple(goals))
+        position = Anchor.of(pose, shapes[link]).position(scales[link], covers, grown)
+        return dataclasses.replace(pose, position=position)
+
+    goals = tuple(goal.at([on_person(pose) for pose in goal.poses]) for goal in task.goals)
+    return dataclasses.replace(task, goals=goals)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -70,7 +71,7 @@ class Anchor:
     (shapes, 3)."""
 
     @classmethod
-    def of(cls, goal: Goal, shapes: Sequence[LinkShape]) -> Self:
+    def of(cls, goal: GoalPose, shapes: Sequence[LinkShape]) -> Self:
         """Return the anchor of a goal on the shapes of its link."""
         near = [shape.nearest(goal.position) for shape in shapes]
         distances = np.array([distance for distance, _, _ in near])

@@ -173,10 +173,10 @@ class PeopleInScene:
                 is_turned = np.any(shape.R_LS != of_man.R_LS, axis=(-2, -1))
                 turned[is_turned, :, part.row] = (R_link @ shape.R_LS[:, None])[is_turned]
         goal_p = self._arrays.goal_p[states]
-        for goal, (on, anchor) in self._anchors.items():
+        for pose, (on, anchor) in self._anchors.items():
             link = _LINKS[on]
             position = anchor.position(of_links[link], covers[link], pads[on] - before[on])
-            goal_p[:, :, goal] = p[:, :, on] + np.matvec(R[:, :, on], position[:, None])
+            goal_p[:, :, pose] = p[:, :, on] + np.matvec(R[:, :, on], position[:, None])
         arrays = self._arrays._replace(
             arm_vs_environment=self._arrays.arm_vs_environment[:, self.rows],
             body_vs_environment=self._arrays.body_vs_environment[:, self.rows],
@@ -263,13 +263,13 @@ class PeopleInScene:
         return _LinkPoses(R=of_links[..., :3], p=of_links[..., 3], turn=turn)
 
     def _read_anchors(self, task: Task) -> dict[int, tuple[int, Anchor]]:
-        """Return number of the link, and anchor on it, of each goal on the person."""
+        """Return number of the link, and anchor on it, of each pose of a goal on the person."""
         anchors = {}
-        for number, goal in enumerate(task.goals):
-            name = self._environment.body_frames[goal.body_frame]
+        for number, pose in enumerate(task.poses):
+            name = self._environment.body_frames[pose.body_frame]
             if name in self._names:
                 link = self._names.index(name)
-                anchors[number] = link, Anchor.of(goal, self._shapes[_LINKS[link]])
+                anchors[number] = link, Anchor.of(pose, self._shapes[_LINKS[link]])
         return anchors
 
 

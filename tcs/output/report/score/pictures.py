@@ -12,7 +12,7 @@ from tcs.errors import SelectionError
 from tcs.kernel.arrays import BOX
 from tcs.model.grid import Grid, InitialConfiguration
 from tcs.model.robots import links_of_arm
-from tcs.model.scene import Scene, goal_poses
+from tcs.model.scene import Scene, alternative_poses, goal_poses
 from tcs.model.tasks import Task, partners
 from tcs.output.draw import (
     BaseFootprint,
@@ -96,7 +96,8 @@ def goal_marks(scene: Scene, task: Task, shown: ShownSet) -> list[GoalMark]:
     names, assignment = shown.goal_names, assign_goals(shown.scores, shown.rows)
     return [
         GoalMark(goal, names[goal], X.translation(), is_reached=assignment[goal] is not None)
-        for goal, X in enumerate(scene.seen_from_mount(goal_poses(scene, task)))
+        for goal, poses in enumerate(alternative_poses(scene, task))
+        for X in scene.seen_from_mount(poses)
     ]
 
 
@@ -196,7 +197,7 @@ def _member_panel(
         *environment_solids(scene),
         *goal_solids(scene, job.task, current),
     ]
-    goals = np.array([X_WG.translation() for X_WG in goal_poses(scene, job.task)])
+    goals = np.array([X_WG.translation() for X_WG in goal_poses(scene, job.task, current)])
     base = scene.base_pose().translation()
     # Views across the line from robot to person, from both sides: neither hides the other.
     along = math.atan2(*(goals.mean(axis=0) - base)[[1, 0]])

@@ -7,7 +7,7 @@ from collections.abc import Collection
 import numpy as np
 
 from tcs.kernel.arrays import BOX
-from tcs.model.scene import Scene, goal_poses
+from tcs.model.scene import Scene, alternative_poses
 from tcs.model.scene.contacts import Group, Part, shape_of
 from tcs.model.scene.environment.environment_file import FLOOR
 from tcs.model.tasks import Task
@@ -57,7 +57,7 @@ def environment_parts(scene: Scene) -> list[tuple[Part, Category]]:
 
 
 def goal_solids(scene: Scene, task: Task, current: int | None) -> list[Solid]:
-    """Return an arrow for each goal: it ends at the goal and points along the tool's x axis.
+    """Return an arrow for each pose of a goal: it ends there and points along the tool's x axis.
 
     Args:
         scene: The scene.
@@ -70,10 +70,11 @@ def goal_solids(scene: Scene, task: Task, current: int | None) -> list[Solid]:
     square = np.array([[wide, wide], [-wide, wide], [-wide, -wide], [wide, -wide]])
     tip = np.vstack([np.column_stack([np.full(4, -head), square]), np.zeros((1, 3))])
     solids = []
-    for g, X_WG in enumerate(goal_poses(scene, task)):
+    for g, poses in enumerate(alternative_poses(scene, task)):
         category = Category.CURRENT_GOAL if g == current else Category.GOAL
-        R, p = X_WG.rotation().matrix(), X_WG.translation()
-        solids += [Solid.placed(category, corners, R, p) for corners in (shaft, tip)]
+        for X_WG in poses:
+            R, p = X_WG.rotation().matrix(), X_WG.translation()
+            solids += [Solid.placed(category, corners, R, p) for corners in (shaft, tip)]
     return solids
 
 

@@ -62,7 +62,7 @@ class Work(NamedTuple):
     def _score_rows(self, start: int, stop: int) -> Scores:
         """Return the scores of configurations start <= h < stop."""
         rows = grid_rows(self.grid, start, stop)
-        goals = self.problem.goal_p.shape[1]
+        goals = self.problem.goals
         if self.excluded is None:
             scores = new_scores(stop - start, goals)
             score_rows(self.problem, self.grippers, rows, scores)
