@@ -162,7 +162,9 @@ def _may_turn(goal: Goal) -> bool:
     """Return whether a goal is the same, with its lines, from all sides of an axis."""
     lines = goal.approach.offset, goal.retreat.offset
     free = goal.free
-    return free is not None and free.rotates and not np.any(np.cross(lines, free.axis).round(9))
+    if free is None or goal.alternatives:
+        return False
+    return free.rotates and not np.any(np.cross(lines, free.axis).round(9))
 
 
 def _spread(stop: Stop, found: list[Access]) -> tuple[Access, ...]:

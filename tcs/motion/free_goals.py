@@ -23,7 +23,7 @@ class FreeGoalPoses:
     """The pose at which each goal of a scene is reached from its initial configurations.
 
     It is that of the most dexterous posture that scoring finds. Of a goal that is not reached, or
-    not free, it is the nominal pose.
+    not free, it is the nominal pose, the first one of a goal that has several.
     """
 
     def __init__(self, problem: Problem, grid: GridArrays, free: Sequence[bool]) -> None:
@@ -47,7 +47,7 @@ class FreeGoalPoses:
 
     def _scored(self, configuration: int) -> list[Pose]:
         problem, row = self._problem, rows_at(self._grid, [configuration])
-        goals = problem.goal_p.shape[1]
+        goals = problem.goals
         scores = new_scores(1, goals)
         score_rows(problem, self._grippers, row, scores)
         q = scores.joints[0].astype(np.float64)

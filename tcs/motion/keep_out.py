@@ -53,8 +53,8 @@ def with_keep_out(lowered: LoweredScene, task: Task) -> LoweredScene:
 
 def _poses(lowered: LoweredScene, task: Task, box: KeepOut) -> tuple[FloatArray, FloatArray]:
     """Return orientations (states, 3, 3) and centres (states, 3) [m] of a box in W."""
-    number = [goal.body_frame for goal in task.goals].index(box.body_frame)
-    goal = task.goals[number]
+    number = [pose.body_frame for pose in task.poses].index(box.body_frame)
+    goal = task.poses[number]
     R_HG = Rotation.from_quat(goal.quaternion, scalar_first=True).as_matrix()
     R_WH = lowered.arrays.goal_R[:, number] @ R_HG.T
     offset = np.array(box.position) - goal.position

@@ -11,7 +11,7 @@ import numpy as np
 from tcs.errors import StoreFormatError
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.motion.straight import OFF_LINE
-from tcs.model.scene import Scene, goal_poses
+from tcs.model.scene import Scene, alternative_poses
 from tcs.model.tasks import TOOL_SPEED
 from tcs.motion.cubics import at_times, extremes
 from tcs.motion.curves import CHAIN
@@ -20,6 +20,7 @@ from tcs.motion.plans import value_of
 from tcs.motion.recheck import StopCheck
 from tcs.motion.stops import Stop
 from tcs.motion.timing import Timed
+from tcs.placement.scoring.drake_check import pose_errors
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.rebuild import rebuild_made_from
 
@@ -262,13 +263,16 @@ def _tool(timing: Timed, stop: Stop) -> tuple[float, float]:
 def _position_error(segment: Segment, stop: Stop, goals: Sequence[int]) -> float:
     """Return the distance of the tool from its goal at the end of an approach [m].
 
-    Of a free goal it is the distance from the nearest pose that serves, or the angle [rad].
+    Of a free goal, or one of several poses, it is the distance from the nearest pose that serves,
+    or the angle [rad].
     """
-    scene, task = stop.scene, stop.job.task
-    number = goals.index(segment.end or 0)
+    scene, task, goal = stop.scene, stop.job.task, goals.index(segment.end or 0)
     scene.set_arm(segment.timing.positions[-1])
-    X_GT = goal_poses(scene, task)[number].inverse() @ scene.tool_pose()
-    free = task.goals[number].free
-    if free is not None:
-        return max(free.errors(X_GT.rotation().matrix(), X_GT.translation()))
-    return float(np.linalg.norm(X_GT.translation()))
+    X_TW = scene.tool_pose().inverse()
+    errors = [
+        pose_errors(X_TW @ X_WG, pose.free)
+        for pose, X_WG in zip(
+            task.goals[goal].poses, alternative_poses(scene, task)[goal], strict=True
+        )
+    ]
+    return min(map(max, errors)) if task.goals[goal].region else errors[0][0]

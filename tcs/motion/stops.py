@@ -111,7 +111,7 @@ class StopGrid:
         velocity, acceleration = in_chain(rates, 1.0)
         poses = None
         if job.task.has_freedom:
-            free = [goal.free is not None for goal in job.task.goals]
+            free = [bool(goal.region) for goal in job.task.goals]
             poses = FreeGoalPoses(build_problem(lowered.arrays), lowered.grid, free)
         if job.task.keep_out:
             lowered = with_keep_out(lowered, job.task)

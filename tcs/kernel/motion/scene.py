@@ -298,11 +298,14 @@ def arm_base(problem: Problem, row: Rows) -> tuple[FloatArray, FloatArray]:
 
 
 def goal_from_arm_base(problem: Problem, row: Rows, goal: int) -> tuple[FloatArray, FloatArray]:
-    """Return X_AG of a goal at one configuration: orientation (3, 3) and position (3,) [m]."""
+    """Return X_AG of a goal at one configuration: orientation (3, 3) and position (3,) [m].
+
+    Of a goal that has several poses it is the first.
+    """
     R_WA, p_WA = arm_base(problem, row)
-    state = row.state[0]
-    R_AG = np.ascontiguousarray(R_WA.T @ problem.goal_R[state, goal])
-    return R_AG, R_WA.T @ (problem.goal_p[state, goal] - p_WA)
+    state, pose = row.state[0], problem.poses_of(goal)[0]
+    R_AG = np.ascontiguousarray(R_WA.T @ problem.goal_R[state, pose])
+    return R_AG, R_WA.T @ (problem.goal_p[state, pose] - p_WA)
 
 
 def carriers(problem: Problem) -> IntArray:

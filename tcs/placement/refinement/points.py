@@ -219,7 +219,7 @@ class PointScorer:
         """Return the scores of configurations with one hand."""
         grippers = gripper_contacts(problem)
         approaches = None if hand.lines is None else ApproachScorer(problem, hand.lines)
-        found = new_scores(len(at.state), problem.goal_p.shape[1])
+        found = new_scores(len(at.state), problem.goals)
 
         def score_batch(start: int) -> None:
             part = slice(start, start + BATCH)

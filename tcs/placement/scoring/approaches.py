@@ -154,7 +154,7 @@ class ApproachScorer:
         )
 
     def _no_pairs(self) -> ReachedPairs:
-        return _pairs_of(new_scores(0, self.problem.goal_p.shape[1]))
+        return _pairs_of(new_scores(0, self.problem.goals))
 
     def score(
         self,
