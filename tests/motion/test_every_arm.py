@@ -1,0 +1,56 @@
+"""Plans of arms of every class: re-checked by Drake, and with the joints of the arm alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+import tcs
+from tcs.files.paths import data_folder
+from tcs.motion import check_plan, evaluate_plan, load_plan, save_plan
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+
+
+def at(x, y, yaw, torso=0.0):
+    return f"base_x = {x} m", f"base_y = {y} m", f"base_yaw = {yaw} deg", f"torso = {torso} m"
+
+
+CASES = {
+    "six joints": ("ur5", 0, at(1.0, -0.6, 0), "shoulder_pan_joint"),
+    "prismatic joints": ("stretch", 2, at(1.1, 0.6, 315), "drive"),
+}
+"""Robot, goal of shaving, configuration, and first joint."""
+
+
+@pytest.fixture(scope="module", params=CASES)
+def planned(request, tmp_path_factory):
+    """The plan of one goal, and the name of the arm's first joint."""
+    robot, goal, only, first = CASES[request.param]
+    task = yaml.safe_load((data_folder() / "tasks" / "adl" / "shaving.yaml").read_text())
+    task["goals"] = [task["goals"][goal]]
+    path = tmp_path_factory.mktemp("arm") / "shaving.yaml"
+    path.write_text(yaml.safe_dump(task))
+    file = tcs.score(path, "wheelchair", robot, jobs=1, only=only, approach=False)
+    return tcs.plan(file, [0]), first
+
+
+def test_the_goal_is_done_and_drake_refutes_nothing(planned, tmp_path):
+    plan, first = planned
+    assert (plan.goals_done, plan.false, plan.joints[0], len(plan.joints)) == (1, 0, first, 6)
+    (stop,) = plan.stops
+    assert stop.returns
+    assert all(s.timing.positions.shape[1] == 6 for s in stop.segments)
+    path = tmp_path / "plan.json"
+    save_plan(path, plan)
+    found = check_plan(load_plan(path))
+    assert (found.is_sound, found.goals, found.edges) == (True, 1, plan.edges)
+
+
+def test_its_motions_are_found_again_under_error(planned):
+    found = evaluate_plan(planned[0], samples=2)
+    assert found.replanned.shape == (2, 1)
+    assert np.any(found.replanned)
