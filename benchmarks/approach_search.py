@@ -8,6 +8,7 @@ along the curve there reach within the velocity limits; a joint beyond a limit r
 these lead to at the other end is a path; Drake judges it at postures a quarter of a millimetre of
 the line apart: on the line, within limits and velocity limits, and free of contact. A refusal is
 searched at short steps only if a path is found at long ones with wider limits and no contacts.
+Through each of the postures of an arm of six joints, found from many starts, leads one line.
 """
 
 from __future__ import annotations
@@ -21,11 +22,13 @@ from numba import njit
 from table import cell, header, parser, row, save
 
 from tcs.kernel.analytic.solver import ArmSolver
-from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
+from tcs.kernel.arrays import BoolArray, Chain, FloatArray, IntArray
 from tcs.kernel.motion.edges import posture_contact
 from tcs.kernel.motion.postures import postures_at
 from tcs.kernel.motion.scene import NO_PAIR, MotionScene, MotionWorkspace
 from tcs.kernel.motion.trees import new_trees
+from tcs.kernel.verification.newton_solutions import newton_solutions, within
+from tcs.kernel.verification.reference import jacobian, link_poses
 from tcs.model.scene import NeighbourList
 from tcs.motion.recheck import CLEARANCE_ROUNDING
 from tcs.motion.stops import Stop, StopGrid
@@ -35,8 +38,8 @@ from tcs.placement.scoring.approaches import approach_lines
 from tcs.placement.tables import Reason
 
 TASK = ("shaving", "wheelchair")
-ROBOTS = ("pr2", "tiago", "iiwa7", "panda", "fr3")
-"""Arms with a closed form."""
+ROBOTS = ("pr2", "tiago", "iiwa7", "panda", "fr3", "ur5", "jaco", "stretch")
+"""Arms of seven joints with a closed form, and of six."""
 APPROACH = (Reason.APPROACH_LIMITS, Reason.APPROACH_BLOCKED)
 SEEDS = 2000
 """Values of the free joint of the closed form from which the curves at the end are found."""
@@ -413,6 +416,59 @@ def _judged(stop: Stop, neighbours: NeighbourList, arm: Arm, path: FloatArray) -
     return Found(path, is_true, slack, speed.max())
 
 
+def search_listed(stop: Stop, neighbours: NeighbourList, goal: int, fastest: FloatArray) -> Found:
+    """Do as `search` for an arm of six joints: the line through each posture is the only one."""
+    chain = stop.grid.lowered.arrays.chain
+    R_AG, p_AG = stop.goal_in_arm_base(goal)
+    back = -R_AG @ np.asarray(stop.job.task.goals[goal].approach.offset)
+    steps = int(np.ceil(np.linalg.norm(back) / FINE))
+    refuted = Found(None, False, 0.0, 0.0)
+    for q in within(chain, newton_solutions(chain, R_AG, p_AG)):
+        path = _line_from(chain, q, R_AG, p_AG, back, steps)
+        if path is not None:
+            speed = float(np.max(np.abs(np.diff(path, axis=0)) * steps / fastest))
+            slack = float(np.min(np.minimum(path - chain.lower, chain.upper - path)[:, 1:]))
+            is_true = speed <= 1.0 and slack >= -1e-9 and _is_free(stop, neighbours, path)
+            refuted = Found(path, is_true, slack, speed)
+            if is_true:
+                break
+    return refuted
+
+
+def _line_from(
+    chain: Chain, q: FloatArray, R_AG: FloatArray, p_AG: FloatArray, back: FloatArray, steps: int
+) -> FloatArray | None:
+    """Return the postures along the line, shape (steps + 1, 7), None if a limit ends it."""
+    path = [q]
+    for n in range(1, steps + 1):
+        q = path[-1].copy()
+        for _ in range(6):
+            R, p = link_poses(chain, q)[-1]
+            turn = R_AG @ R.T
+            skew = [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]
+            error = np.concatenate([0.5 * np.array(skew), p_AG + n / steps * back - p])
+            if np.abs(error).max() < AT_POSE:
+                break
+            q[1:] += np.linalg.lstsq(jacobian(chain, q), error, rcond=1e-9)[0]
+        else:
+            return None
+        if np.any((q < chain.lower - 1e-9) | (q > chain.upper + 1e-9)):
+            return None
+        path.append(q)
+    return np.array(path)
+
+
+def _is_free(stop: Stop, neighbours: NeighbourList, path: FloatArray) -> bool:
+    """Return whether Drake finds nothing in contact along a path."""
+    scene = stop.scene
+    for q in path:
+        scene.set_arm(q)
+        for first, second, distance in neighbours.violations():
+            if distance < scene.required_clearance(first, second) - CLEARANCE_ROUNDING:
+                return False
+    return True
+
+
 def refusals(robot: str, most: int, seed: int) -> None:
     """Search approaches of refusals of a robot drawn at random.
 
@@ -427,6 +483,7 @@ def refusals(robot: str, most: int, seed: int) -> None:
     (table,) = sweep(lowered, job.task.weights, jobs=1, approaches=lines).tables
     neighbours = NeighbourList(scene)
     stops, trees = StopGrid.of(job, scene, job.scored_grid, lowered), new_trees(seed)
+    find = search_listed if lowered.arrays.chain.joints == 6 else search
     for reason in APPROACH:
         refused = np.argwhere(table.reason == reason)
         order = np.random.default_rng(seed).permutation(len(refused))
@@ -440,7 +497,7 @@ def refusals(robot: str, most: int, seed: int) -> None:
             stop = stops.stop(number, trees)
             values = job.scored_grid.values(np.array([number]))
             stop.place({axis: float(value[0]) for axis, value in values.items()})
-            found = search(stop, neighbours, goal, lines.fastest[goal])
+            found = find(stop, neighbours, goal, lines.fastest[goal])
             free += found.is_true
             if found.path is not None:
                 row(

@@ -249,8 +249,8 @@ def _score_single_pose(
     return score_pair(problem, work, body_A, solver)
 
 
-class _OfSolver(AbstractTemplate):
-    """Types a call by the type of its last argument, the solver.
+class OfSolver(AbstractTemplate):
+    """Types a call by the type of its last argument, the solver, unless `solver` finds another.
 
     As `numba.extending.overload` does, without a function in between.
     """
@@ -260,9 +260,14 @@ class _OfSolver(AbstractTemplate):
     entries: ClassVar[dict[Any, Any]]
     """Compiled implementations by the types of the arguments."""
 
+    @staticmethod
+    def solver(args: Any) -> type:
+        """Return the class of the solver, given the types of the arguments."""
+        return tuple_class(args[-1])
+
     def generic(self, args: Any, kws: Any) -> Any:
         """Return the signature of the implementation that fits the types of the arguments."""
-        implementation = self.implementations[tuple_class(args[-1])]
+        implementation = self.implementations[self.solver(args)]
         dispatcher: Any = numba.typeof(implementation)
         signature: Any = dispatcher.get_call_type(self.context, args, kws)
         self.entries[signature.args] = dispatcher.get_overload(signature)
@@ -274,7 +279,7 @@ class _OfSolver(AbstractTemplate):
 
 
 @infer_global(out_of_reach)
-class _OutOfReach(_OfSolver):
+class _OutOfReach(OfSolver):
     implementations: ClassVar[dict[type, Any]] = {
         Search: analytic.out_of_reach,
         NumericSolver: numeric.out_of_reach,
@@ -285,7 +290,7 @@ class _OutOfReach(_OfSolver):
 
 
 @infer_global(score_pair)
-class _ScorePair(_OfSolver):
+class _ScorePair(OfSolver):
     implementations: ClassVar[dict[type, Any]] = {
         Search: analytic.score_pair,
         NumericSolver: numeric.score_pair,
@@ -296,7 +301,7 @@ class _ScorePair(_OfSolver):
 
 
 @infer_global(score_pose)
-class _ScorePose(_OfSolver):
+class _ScorePose(OfSolver):
     implementations: ClassVar[dict[type, Any]] = {
         Search: _score_single_pose,
         NumericSolver: _score_single_pose,
@@ -307,7 +312,7 @@ class _ScorePose(_OfSolver):
 
 
 @infer_global(look_near)
-class _LookNear(_OfSolver):
+class _LookNear(OfSolver):
     implementations: ClassVar[dict[type, Any]] = {
         Search: analytic.look_near,
         NumericSolver: _numeric_look,
@@ -318,7 +323,7 @@ class _LookNear(_OfSolver):
 
 
 @infer_global(tilt_to_limits)
-class _TiltToLimits(_OfSolver):
+class _TiltToLimits(OfSolver):
     implementations: ClassVar[dict[type, Any]] = {
         Search: analytic.tilt_to_limits,
         NumericSolver: _unknown_tilt,
@@ -329,7 +334,7 @@ class _TiltToLimits(_OfSolver):
 
 
 @infer_global(quick_look)
-class _QuickLook(_OfSolver):
+class _QuickLook(OfSolver):
     implementations: ClassVar[dict[type, Any]] = {
         Search: analytic.quick_look,
         NumericSolver: _numeric_look,

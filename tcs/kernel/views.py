@@ -99,6 +99,12 @@ def tuple_class(numba_type: Any) -> type:
     return cast(type, owned.instance_class)
 
 
+def field_class(numba_type: Any, name: str) -> type:
+    """Return the class of a field, a named tuple too, of what `tuple_class` takes."""
+    owned = numba_type.owned if isinstance(numba_type, UnownedView) else numba_type
+    return tuple_class(owned.types[owned.fields.index(name)])
+
+
 if TYPE_CHECKING or vars(numba.config)["DISABLE_JIT"]:
 
     def unowned(owned: _Owned) -> _Owned:

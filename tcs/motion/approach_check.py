@@ -17,7 +17,7 @@ from tcs.kernel.rows import rows_at
 from tcs.model.scene import LoweredScene, NeighbourList, Scene, goal_poses
 from tcs.motion.curves import Curve
 from tcs.motion.recheck import false_pieces
-from tcs.motion.stops import Stop, single_axes, single_grid
+from tcs.motion.stops import single_axes, single_grid
 from tcs.placement.scoring.approaches import approach_lines
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.rebuild import rebuild_scenes
@@ -134,28 +134,47 @@ class ApproachScene:
         points, tangents = spline
         turns = np.abs(np.angle(np.exp(1j * (points[-1] - q))))
         curve = Curve(np.linspace(0.0, 1.0, len(points)), points, tangents)
-        stop = Stop.of(self.job, self.scene, number, 0)
+        self._place(number)
         error = self._line_error(curve, goal)
         speed = _greatest_rate(curve, self.lines.fastest[goal])
         is_true = (
             bool(np.all(turns <= SAME_POSTURE))
             and error <= LINE_BAR
             and speed <= SPEED_BAR
-            and false_pieces(self.neighbours, stop.motion, curve) == 0
+            and false_pieces(self.neighbours, self.around.motion, curve) == 0
         )
         return ApproachFinding(is_true, error, speed)
 
+    def _place(self, number: int) -> None:
+        """Set the live scene to a configuration of the scored grid."""
+        scene, grid = self.scene, self.job.scored_grid
+        at = {name: float(value) for name, value in grid.values(number).items()}
+        scene.place_base(at["base_x"], at["base_y"], at["base_yaw"])
+        scene.set_torso(at["torso"])
+        for axis in grid.environment_axes:
+            scene.set_joint(axis.name, at[axis.name])
+
     def _line_error(self, curve: Curve, goal: int) -> float:
-        """Return the greatest error of the tool along the line to a goal [rad and m]."""
-        scene, worst = self.scene, 0.0
-        X_GW = goal_poses(scene, self.job.task)[goal].inverse()
-        offset = np.asarray(self.job.task.goals[goal].approach.offset)
+        """Return the greatest error of the tool along the line to a goal [rad and m].
+
+        To a free goal the line ends where the tool is at the end of the curve.
+        """
+        scene, worst, task = self.scene, 0.0, self.job.task
+        axis, end = self.problem.turn, goal_poses(scene, task)[goal]
+        if task.goals[goal].free is not None:
+            scene.set_arm(curve.q[-1])
+            end = scene.tool_pose()
+        X_GW, offset = end.inverse(), np.asarray(task.goals[goal].approach.offset)
         for begin, fraction, q in _samples(curve):
             scene.set_arm(q)
             X_GT = X_GW @ scene.tool_pose()
             ahead = 1.0 - (begin + fraction) / curve.pieces
             off = float(np.linalg.norm(X_GT.translation() + ahead * offset))
-            worst = max(worst, off, float(X_GT.rotation().ToAngleAxis().angle()))
+            turned = float(X_GT.rotation().ToAngleAxis().angle())
+            if np.any(axis):
+                # An arm of five joints may rotate the tool about this axis on the way.
+                turned = float(np.linalg.norm(X_GT.rotation().matrix() @ axis - axis))
+            worst = max(worst, off, turned)
         return worst
 
 

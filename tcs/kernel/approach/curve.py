@@ -22,6 +22,7 @@ from tcs.kernel.motion.straight import (
     evaluate_on_line,
     keep_within_limits,
     new_straight_workspace,
+    release_joints,
     take_piece,
     take_pieces,
 )
@@ -87,15 +88,14 @@ def new_curve() -> CurveWorkspace:
 
 
 @inner
-def place_line(work: Workspace, curve: CurveWorkspace) -> None:
+def place_line(scene: MotionScene, work: Workspace, curve: CurveWorkspace) -> None:
     """Let the line begin at the current goal."""
     curve.probes[0] = 0
     for r in range(3):
         curve.line.p_AT[r] = work.p_AG[r]
         for c in range(3):
             curve.line.R_AT[r, c] = work.R_AG[r, c]
-    for k in range(7):
-        curve.line.locked[k] = 0
+    release_joints(scene, curve.line)
 
 
 @inner

@@ -11,7 +11,7 @@ from __future__ import annotations
 from tcs.kernel.analytic.ik import within
 from tcs.kernel.approach.curve import MOST, finish_spline, is_too_fast, spline_is_free
 from tcs.kernel.approach.grid import NOWHERE, PIECES
-from tcs.kernel.approach.memory import Approach
+from tcs.kernel.approach.memory import AnyApproach, Approach
 from tcs.kernel.approach.opening import end_of_window
 from tcs.kernel.approach.scene import pair_contact_code
 from tcs.kernel.approach.turns import place_sample
@@ -25,6 +25,7 @@ from tcs.kernel.motion.straight import (
     LIMITS,
     OFF_LINE,
     next_on_line,
+    release_joints,
     tangent_on_line,
 )
 from tcs.kernel.problem import Problem
@@ -38,26 +39,27 @@ APART = 8
 
 
 @inner
-def lead_from(problem: Problem, approach: Approach, fastest: FloatArray, first: int) -> int:
+def lead_from(
+    problem: Problem, approach: AnyApproach, fastest: FloatArray, first: int, q: FloatArray
+) -> int:
     """Follow the line from one of its points to both ends; return DONE, LIMITS or BLOCKED.
 
     Args:
         problem: The scene.
-        approach: The line is in place, and a posture on it in `search.q`; the spline is filled, and
-            `contact` if this is the first line that is blocked.
+        approach: The line is in place; the spline is filled, and `contact` if this is the first
+            line that is blocked.
         fastest: As for `approach_pair`.
         first: Number of the point of the spline at which the posture is.
+        q: The posture [rad], shape (7,).
     """
     curve, scene, offset = approach.curve, approach.scene, approach.offset
-    points, slopes, line, q = curve.points, curve.slopes, curve.line, approach.search.q
-    for k in range(7):
-        line.locked[k] = 0
+    points, slopes, line = curve.points, curve.slopes, curve.line
+    release_joints(scene, line)
     if not next_on_line(scene, line, offset, first / MOST, q, points[first]):
         return LIMITS
     for side in range(2):
         step = 1 - 2 * side
-        for k in range(7):
-            line.locked[k] = 0
+        release_joints(scene, line)
         n = first
         while True:
             if not tangent_on_line(scene, line, offset, points[n], slopes[n]):
@@ -72,8 +74,7 @@ def lead_from(problem: Problem, approach: Approach, fastest: FloatArray, first: 
                 return LIMITS
             if is_too_fast(points, n + side, MOST, fastest):
                 return LIMITS
-    for k in range(7):
-        line.locked[k] = 0
+    release_joints(scene, line)
     if finish_spline(scene, approach.motion, curve, offset, MOST) > OFF_LINE:
         return LIMITS
     if spline_is_free(scene, approach.motion, curve):
@@ -127,13 +128,13 @@ def _lead_through(
     """
     arm, grid, search = problem.arm, approach.grid, approach.search
     place_sample(arm, grid.goal[level], arm.branches[b], angle, search.q, approach.motion.turns)
-    if lead_from(problem, approach, fastest, level * PER_LEVEL) != DONE:
+    if lead_from(problem, approach, fastest, level * PER_LEVEL, search.q) != DONE:
         return False
     for k in range(7):
         search.best[k] = within(approach.curve.points[0, k], arm.lower[k], arm.upper[k])
     # It counts only if the posture at the goal, as it is stored, leads along that line again.
     rounded_inward(search.best, arm.lower, arm.upper, search.q)
-    return lead_from(problem, approach, fastest, AT_GOAL) == DONE
+    return lead_from(problem, approach, fastest, AT_GOAL, search.q) == DONE
 
 
 @inner

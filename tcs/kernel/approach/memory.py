@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from tcs.kernel.analytic.scratch import Search, new_search
+from tcs.kernel.analytic.scratch import Search
 from tcs.kernel.approach.curve import CurveWorkspace, new_curve
 from tcs.kernel.approach.grid import LineGrid, new_grid
 from tcs.kernel.approach.scene import LineScene
 from tcs.kernel.arrays import FloatArray, IntArray
+from tcs.kernel.five_joints.pairs import FiveJointSolver
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace, new_motion_workspace
+from tcs.kernel.numeric.search import NumericSolver
 from tcs.kernel.problem import Problem
+from tcs.kernel.six_joints.pairs import SixJointSolver
+from tcs.kernel.solvers import new_solver
 from tcs.kernel.workspace import Workspace, new_workspace
 
 MOST_CURVES = 100
@@ -22,7 +26,7 @@ ENOUGH = 1_000_000
 
 
 class Approach(NamedTuple):
-    """Memory of one worker."""
+    """Memory of one worker, for an arm of seven joints with a closed form."""
 
     work: Workspace
     search: Search
@@ -47,12 +51,53 @@ class Approach(NamedTuple):
     """First contact that blocked a motion, as a code, shape (1,)."""
 
 
-def new_approach(problem: Problem, lines: LineScene) -> Approach:
+Solver = TypeVar("Solver", bound=NumericSolver | SixJointSolver | FiveJointSolver)
+
+
+class ListedApproach(NamedTuple, Generic[Solver]):
+    """Memory of one worker, for an arm whose postures at the goal are listed."""
+
+    work: Workspace
+    search: Solver
+    """The solver of the arm."""
+    scene: MotionScene
+    moving: IntArray
+    """As in `LineScene`."""
+    moved: FloatArray
+    """As in `LineScene`."""
+    motion: MotionWorkspace
+    curve: CurveWorkspace
+    offset: FloatArray
+    """As in `Approach`."""
+    contact: IntArray
+    """As in `Approach`."""
+    q: FloatArray
+    """Posture whose line is followed [rad], shape (7,)."""
+
+
+AnyApproach = Approach | ListedApproach[Any]
+
+
+def new_approach(problem: Problem, lines: LineScene) -> AnyApproach:
     """Return the memory of one worker, given the `approach_scene` of the problem."""
     scene = lines.motion._replace(centre=lines.motion.centre.copy())
+    solver = new_solver(problem)
+    if not isinstance(solver, Search):
+        return ListedApproach(
+            new_workspace(problem),
+            solver,
+            scene,
+            lines.moving,
+            lines.moved,
+            new_motion_workspace(scene),
+            new_curve(),
+            np.empty(3),
+            np.zeros(1, np.int64),
+            np.empty(7),
+        )
     return Approach(
         new_workspace(problem),
-        new_search(),
+        solver,
         new_grid(),
         scene,
         lines.moving,

@@ -1,4 +1,4 @@
-"""The best approachable posture of one reached pair."""
+"""The best approachable posture of one reached pair, for an arm with a closed form."""
 
 from __future__ import annotations
 
@@ -57,19 +57,7 @@ SHIFTS = 4
 
 @inner
 def approach_pair(problem: Problem, approach: Approach, fastest: FloatArray, q: FloatArray) -> int:
-    """Find the best posture of a reached pair that can be left backwards along the approach.
-
-    Args:
-        problem: The scene.
-        approach: `work`, `scene` and `offset` are in place. `search.best` is filled with the joint
-            angles [rad] if another posture than q is the best, `contact` if all are blocked.
-        fastest: Greatest motion of each joint for the whole line at constant rate [rad], shape
-            (7,).
-        q: Joint angles that scoring found [rad], shape (7,).
-
-    Returns:
-        REACHED, APPROACH_LIMITS or APPROACH_BLOCKED; -1 if q itself is approachable.
-    """
+    """Do as `solvers.approach_pair` for an arm of seven joints with a closed form."""
     _prepare(problem, approach, fastest, q)
     columns = approach.columns
     if _is_approachable(problem, approach, fastest):
@@ -241,8 +229,7 @@ def _search_lines(problem: Problem, approach: Approach, fastest: FloatArray, q: 
         Whether a line is free.
     """
     arm, grid, columns, search = problem.arm, approach.grid, approach.columns, approach.search
-    copy_joints(q, search.q)
-    if lead_from(problem, approach, fastest, AT_GOAL) == DONE:
+    if lead_from(problem, approach, fastest, AT_GOAL, q) == DONE:
         copy_joints(q, search.best)
         return True
     if grid.is_fine[0] or approach.contact[0] != NO_CONTACT:
@@ -320,14 +307,7 @@ def _most_columns(arm: ArmSolver, grid: LineGrid, fastest: FloatArray) -> int:
 
 @inner
 def follow_posture(problem: Problem, approach: Approach, fastest: FloatArray, q: FloatArray) -> int:
-    """Follow the line from a posture at the goal; return DONE if it succeeds.
-
-    Args:
-        problem: The scene.
-        approach: As for `approach_pair`; the spline is filled.
-        fastest: As for `approach_pair`.
-        q: Joint angles of a posture free of contact [rad], shape (7,).
-    """
+    """Do as `solvers.follow_posture` for an arm of seven joints with a closed form."""
     _prepare(problem, approach, fastest, q)
     b, columns, grid, arm = approach.columns[3], approach.columns, approach.grid, problem.arm
     columns[5] = 0
@@ -360,8 +340,7 @@ def follow_posture(problem: Problem, approach: Approach, fastest: FloatArray, q:
             middle = 0.5 * (grid.spans[b, level, 0] + grid.spans[b, level, 1])
             centre = grid.origin[0] + middle * grid.origin[1]
     if outcome != DONE:
-        copy_joints(q, approach.search.q)
-        outcome = lead_from(problem, approach, fastest, AT_GOAL)
+        outcome = lead_from(problem, approach, fastest, AT_GOAL, q)
     return outcome
 
 
@@ -370,7 +349,7 @@ def _prepare(problem: Problem, approach: Approach, fastest: FloatArray, q: Float
     """Place line and grid, and find column and branch of the posture that scoring found."""
     arm, grid, search, columns = problem.arm, approach.grid, approach.search, approach.columns
     place_levels(arm, approach.work, approach.offset, grid)
-    place_line(approach.work, approach.curve)
+    place_line(approach.scene, approach.work, approach.curve)
     angle = q[arm.free]
     columns[0] = place_columns(arm, grid, angle)
     columns[1] = _most_columns(arm, grid, fastest)

@@ -79,9 +79,9 @@ def _is_apart_from_torso(problem: Problem, scene: MotionScene) -> BoolArray:
         problem: The scene.
         scene: A scene of it without groups; the result has shape (n_pairs,).
     """
-    moved = _is_moved(problem.body_A)
+    moved = np.append(_is_moved(problem.body_A), False)
     shape = scene.pair[:, 1] - len(scene.links) - problem.environment_body.size
-    found: BoolArray = (shape >= 0) & moved[np.maximum(shape, 0)]
+    found: BoolArray = moved[np.where(shape >= 0, shape, -1)]
     return found
 
 

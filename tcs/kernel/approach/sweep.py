@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.kernel.approach.memory import Approach, new_approach
-from tcs.kernel.approach.pairs import approach_pair, follow_posture
+from tcs.kernel.approach.memory import AnyApproach, new_approach
 from tcs.kernel.approach.scene import LineScene, approach_scene, place_scene
+from tcs.kernel.approach.solvers import approach_pair, follow_posture
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.base_pose import (
     environment_in_arm_base,
@@ -58,12 +58,12 @@ def score_approaches(
     lines: ApproachLines,
     rows: Rows,
     pairs: ReachedPairs,
-    memory: Approach | None = None,
+    memory: AnyApproach | None = None,
 ) -> None:
     """Replace the scores of reached pairs by those with approach.
 
     Args:
-        problem: The scene and its goals; an arm with a closed form.
+        problem: The scene and its goals.
         lines: The approaches of the goals.
         rows: The configurations.
         pairs: The scores; replaced.
@@ -88,7 +88,7 @@ def approach_spline(
     """Return the approach of a posture as a spline in joint space, None if none is found.
 
     Args:
-        problem: The scene and its goals; an arm with a closed form.
+        problem: The scene and its goals.
         lines: The approaches of the goals.
         row: The configuration.
         goal: Number of the goal.
@@ -112,7 +112,7 @@ def approach_spline(
 @jit
 def _follow_posture(
     owned_problem: Problem,
-    owned_approach: Approach,
+    owned_approach: AnyApproach,
     owned_lines: ApproachLines,
     owned_row: Rows,
     goal: int,
@@ -128,7 +128,7 @@ def _follow_posture(
 
 
 @inner
-def _place_surroundings(problem: Problem, approach: Approach, torso: int) -> None:
+def _place_surroundings(problem: Problem, approach: AnyApproach, torso: int) -> None:
     """Place everything around the arm, the base being in place."""
     environment_in_arm_base(problem, approach.work, torso)
     place_scene(
@@ -139,7 +139,7 @@ def _place_surroundings(problem: Problem, approach: Approach, torso: int) -> Non
 
 @inner
 def _place_goal(
-    problem: Problem, approach: Approach, lines: ApproachLines, state: int, torso: int, g: int
+    problem: Problem, approach: AnyApproach, lines: ApproachLines, state: int, torso: int, g: int
 ) -> None:
     """Fill the pose of a goal in A, and the offset from there to the begin of its approach."""
     work = approach.work
@@ -155,7 +155,7 @@ def _place_goal(
 @jit
 def _score_approaches(
     owned_problem: Problem,
-    owned_approach: Approach,
+    owned_approach: AnyApproach,
     owned_lines: ApproachLines,
     owned_rows: Rows,
     owned_pairs: ReachedPairs,

@@ -177,8 +177,9 @@ def _lead(
     newton, last = line.newton, len(points) - 1
     place_links(scene.chain_R, scene.chain_p, q, line.turns, newton.link_R, newton.link_p)
     place_tool(scene.chain_R, scene.chain_p, newton.link_R, newton.link_p, line.R_AT, line.p_AT)
+    release_joints(scene, line)
     for k in range(7):
-        points[0, k], line.locked[k] = q[k], _never_moves(scene, k)
+        points[0, k] = q[k]
     for n in range(last + 1):
         if n > 0 and not next_on_line(scene, line, offset, n / last, points[n - 1], points[n]):
             return LIMITS
@@ -188,8 +189,7 @@ def _lead(
             if abs(tangents[n, k]) > fastest[k]:
                 return LIMITS
     keep_within_limits(scene, points, tangents)
-    for k in range(7):
-        line.locked[k] = _never_moves(scene, k)
+    release_joints(scene, line)
     for n in range(last):
         take_piece(work, points, tangents, n)
         if error_between(scene, work, line, offset, (n + 0.5) / last) > OFF_LINE:
@@ -207,10 +207,11 @@ def _lead(
 
 
 @inner
-def _never_moves(scene: MotionScene, k: int) -> int:
-    """Return 1 if joint k is one that the arm lacks, and does not stand for another, else 0."""
-    is_turn = k == 0 and may_turn(scene)
-    return 1 if scene.lower[k] == scene.upper[k] and not is_turn else 0
+def release_joints(scene: MotionScene, line: StraightWorkspace) -> None:
+    """Lock no joint but those that the arm lacks and that do not stand for another."""
+    for k in range(7):
+        is_turn = k == 0 and may_turn(scene)
+        line.locked[k] = 1 if scene.lower[k] == scene.upper[k] and not is_turn else 0
 
 
 @inner
@@ -271,21 +272,24 @@ def _error_on_line(scene: MotionScene, line: StraightWorkspace, q: FloatArray) -
 
 @inner
 def _without_turn(scene: MotionScene, line: StraightWorkspace) -> float:
-    """Take the rotation about the free axis off `newton.error`; return the rest [rad and m]."""
-    error, worst, along = line.newton.error, 0.0, 0.0
-    for r in range(3):
-        along += error[r] * _turn_in_base(scene, line, r)
-    for r in range(3):
-        error[r] -= along * _turn_in_base(scene, line, r)
+    """Let the direction of the free axis alone count in `newton.error`; return it [rad and m]."""
+    error, worst = line.newton.error, 0.0
+    R, S = line.newton.R_AT, line.R_AT
+    x, y, z = (_turn_in_base(scene, R, 0), _turn_in_base(scene, R, 1), _turn_in_base(scene, R, 2))
+    u, v, w = (_turn_in_base(scene, S, 0), _turn_in_base(scene, S, 1), _turn_in_base(scene, S, 2))
+    # However far the tool is rotated about it, Newton's method converges as fast.
+    error[0], error[1], error[2] = y * w - z * v, z * u - x * w, x * v - y * u
+    if x * u + y * v + z * w < 0.0:
+        error[0] = 1.0
     for m in range(6):
         worst = max(worst, abs(error[m]))
     return worst
 
 
 @inner
-def _turn_in_base(scene: MotionScene, line: StraightWorkspace, r: int) -> float:
-    """Return a component in A of the axis about which the tool is free to rotate."""
-    R, turn = line.R_AT, scene.turn
+def _turn_in_base(scene: MotionScene, R: FloatArray, r: int) -> float:
+    """Return a component in A of the axis about which a tool, at orientation R, may rotate."""
+    turn = scene.turn
     return R[r, 0] * turn[0] + R[r, 1] * turn[1] + R[r, 2] * turn[2]
 
 
@@ -301,7 +305,7 @@ def evaluate_on_line(scene: MotionScene, line: StraightWorkspace, q: FloatArray)
                 newton.J[i, k] = 0.0
     if may_turn(scene):
         for r in range(3):
-            newton.J[r, 0], newton.J[3 + r, 0] = _turn_in_base(scene, line, r), 0.0
+            newton.J[r, 0], newton.J[3 + r, 0] = _turn_in_base(scene, line.R_AT, r), 0.0
     return error
 
 

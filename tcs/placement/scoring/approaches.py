@@ -15,19 +15,18 @@ from numpy.typing import NDArray
 
 from tcs.errors import ArmClassError, RobotError
 from tcs.files.mapped import chunks
-from tcs.kernel.analytic.solver import any_solver, is_outside
 from tcs.kernel.arrays import GridArrays
+from tcs.kernel.freedom.forms import FEWEST_JOINTS
 from tcs.kernel.problem import Problem
 from tcs.kernel.rows import Rows, no_rows, rows_at
-from tcs.kernel.scores import REACHED, Scores, new_scores
+from tcs.kernel.scores import JOINTS, REACHED, Scores, new_scores
 from tcs.kernel.second_process import compiled_beside
-from tcs.model.scene import Scene, arm_chain
 from tcs.model.tasks import TOOL_SPEED
 from tcs.placement.scoring.job import Job
 from tcs.placement.store import APPROACH, WITHOUT_APPROACH
 
 if TYPE_CHECKING:
-    from tcs.kernel.approach.memory import Approach
+    from tcs.kernel.approach.memory import AnyApproach
     from tcs.kernel.approach.scene import LineScene
     from tcs.kernel.approach.sweep import ApproachLines, ReachedPairs
 
@@ -47,9 +46,11 @@ def approach_lines(job: Job) -> ApproachLines:
     velocity, _ = job.spec.robot.arm_rates()
     goals = job.task.goals
     seconds = np.array([goal.approach.distance / TOOL_SPEED for goal in goals])
+    # Joints that the arm lacks are the first ones of its chain, and never move.
+    limits = np.concatenate([np.full(JOINTS - len(velocity), np.inf), velocity])
     return ApproachLines(
         offset=np.array([goal.approach.offset for goal in goals]),
-        fastest=seconds[:, None] * np.array(velocity),
+        fastest=seconds[:, None] * limits,
     )
 
 
@@ -70,49 +71,33 @@ class ApproachChoice:
         return {WITHOUT_APPROACH: self.hindrance} if self.hindrance else {}
 
 
-def choose_approach(wanted: bool | None, scenes: Iterable[tuple[Job, Scene]]) -> ApproachChoice:
+def choose_approach(wanted: bool | None, jobs: Iterable[Job]) -> ApproachChoice:
     """Return whether goals are scored with their approaches.
 
     Args:
         wanted: Whether they should be; None for wherever all of them can be.
-        scenes: The job of each arm or hand, with its scene, whose state is restored.
+        jobs: The job of each arm or hand.
 
     Raises:
         ArmClassError: If they should be and cannot.
     """
     if wanted is False:
         return ApproachChoice(False)
-    hindrance = next(filter(None, (approach_hindrance(job, scene) for job, scene in scenes)), "")
+    hindrance = next(filter(None, map(approach_hindrance, jobs)), "")
     if hindrance and wanted:
         raise ArmClassError(f"{hindrance}. Score the task without approach (--no-approach).")
     return ApproachChoice(not hindrance, hindrance)
 
 
-def approach_hindrance(job: Job, scene: Scene) -> str:
-    """Return why the approaches of a job's goals cannot be scored, "" if they can be.
-
-    Args:
-        job: The job.
-        scene: Its scene, whose state is restored.
-    """
+def approach_hindrance(job: Job) -> str:
+    """Return why the approaches of a job's goals cannot be scored, "" if they can be."""
     if job.hand.other is not None:
         return (
             "approaches are scored for one arm, but goals of this task are reached by two at the "
             "same time"
         )
-    if job.task.has_freedom:
+    if job.task.has_freedom and len(job.spec.robot.arm_joints) > FEWEST_JOINTS:
         return "approaches are scored for goals of a single pose, but goals of this task are free"
-    before = scene.positions()
-    try:
-        scene.set_arm(np.zeros(len(scene.built.arm_joints)))
-        chain, _ = arm_chain(scene)
-    finally:
-        scene.restore(before)
-    if is_outside(any_solver(chain)):
-        return (
-            "approaches are scored for arms of seven joints with a closed form, which "
-            f"'{job.spec.robot.name}' is not"
-        )
     try:
         job.spec.robot.arm_rates()
     except RobotError as error:
@@ -229,7 +214,7 @@ class ApproachScorer:
         scores.reason[at], scores.contact[at] = pairs.reason, pairs.contact
         scores.dexterity[at], scores.joints[at] = pairs.dexterity, pairs.joints
 
-    def memory(self) -> Approach:
+    def memory(self) -> AnyApproach:
         """Return the memory of this thread, whose pages take as long as 30 pairs to touch."""
         from tcs.kernel.approach.memory import new_approach
 
@@ -237,7 +222,7 @@ class ApproachScorer:
             with self._arranging:
                 scene = self.scene
             self._of_thread.memory = new_approach(self.problem, scene)
-        found: Approach = self._of_thread.memory
+        found: AnyApproach = self._of_thread.memory
         return found
 
 

@@ -76,7 +76,7 @@ def estimate(
         ArmClassError: If `approach` is requested where it cannot be scored.
     """
     built = [(job, job.scene()) for job in hands]
-    choice = choose_approach(approach, built)
+    choice = choose_approach(approach, hands)
     found = []
     for job, scene in built:
         lowered = job.lowered(scene)

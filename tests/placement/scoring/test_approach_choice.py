@@ -8,7 +8,7 @@ import pytest
 from tcs.errors import ArmClassError
 from tcs.files.blocks import BlockFolder
 from tcs.files.paths import data_folder
-from tcs.model.scene import EMPTY_ENVIRONMENT, Scene, SceneSpec
+from tcs.model.robots import robot_names
 from tcs.placement.scoring import LiveScorer, load_job, score, summary
 from tcs.placement.scoring.approach_pass import approaches_key
 from tcs.placement.scoring.approaches import (
@@ -63,35 +63,29 @@ def test_live_scoring_decides_as_offline_scoring(by_default, corner):
     np.testing.assert_array_equal(live.nominal.scores.reason, by_default.nominal.scores.reason)
 
 
-def test_all_arms_of_a_file_are_scored_with_approach_or_none(corner):
+def test_all_arms_of_a_file_are_scored_with_approach_or_none(corner, slow_iiwa):
     both = score("shaving", corner, arms="both")
     assert "approach" in both.metadata
     assert np.isin(both.nominal.scores.reason, APPROACH).any()
-    able, unable = load_job("shaving", corner, "pr2"), load_job("feeding", corner, "stretch")
-    scenes = [(job, job.scene()) for job in (able, unable)]
-    assert choose_approach(None, scenes[:1]).is_scored
-    choice = choose_approach(None, scenes)
+    jobs = [load_job("shaving", corner, "pr2"), load_job("feeding", corner, slow_iiwa)]
+    assert choose_approach(None, jobs[:1]).is_scored
+    choice = choose_approach(None, jobs)
     assert not choice.is_scored
-    assert "'stretch'" in choice.hindrance
+    assert "'iiwa_joint_1'" in choice.hindrance
     with pytest.raises(ArmClassError, match="--no-approach"):
-        choose_approach(True, scenes)
-    assert choose_approach(False, scenes).entry == {}
+        choose_approach(True, jobs)
+    assert choose_approach(False, jobs).entry == {}
+
+
+@pytest.mark.parametrize("robot", robot_names())
+def test_approaches_of_every_robot_are_scored(robot):
+    assert approach_hindrance(load_job("feeding", "wheelchair", robot)) == ""
 
 
 def test_unknown_velocity_limits_are_named(slow_iiwa, corner):
-    job = load_job("feeding", corner, slow_iiwa)
-    why = approach_hindrance(job, Scene(SceneSpec(job.spec.robot, EMPTY_ENVIRONMENT)))
+    why = approach_hindrance(load_job("feeding", corner, slow_iiwa))
     assert "no velocity limit of 'iiwa_joint_1'" in why
     assert "velocity_limits" in why
-
-
-def test_the_arm_of_a_scene_stays_where_it_is(corner):
-    job = load_job("shaving", corner, "pr2")
-    scene = job.scene()
-    scene.set_arm(np.full(7, -0.1))
-    before = scene.positions()
-    assert approach_hindrance(job, scene) == ""
-    np.testing.assert_array_equal(scene.positions(), before)
 
 
 def test_a_dry_run_scores_approaches_too(by_default, corner):

@@ -1,4 +1,4 @@
-"""Goals whose approach the grid of the free joint does not find, but Newton's method does."""
+"""Goals whose approach Newton's method finds: beside the grid of the free joint, and without it."""
 
 from __future__ import annotations
 
@@ -22,6 +22,10 @@ from tcs.placement.scoring.approaches import approach_lines
         ("tiago", 81538, 4),
         # Only next to a limit, closer than the grid's angles, does nothing touch.
         ("pr2", 80857, 0),
+        # Another posture than the best one.
+        ("ur5", 12369, 6),
+        # The base drives, the lift and the telescope move.
+        ("stretch", 14778, 6),
     ],
 )
 def test_approaches_that_only_newton_follows_are_found_and_confirmed_by_drake(robot, at, goal):
