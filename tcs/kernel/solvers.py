@@ -136,27 +136,6 @@ def _five_joint_look(
     return five_joints.score_pair(problem, work, body_A, solver)
 
 
-def tilt_to_limits(problem: Problem, work: Workspace, solver: Solver) -> float:
-    """Return an angle by which a goal that fails at joint limits may tilt without being reached.
-
-    Args:
-        problem: The scene.
-        work: Workspace with the goal in place.
-        solver: As `score_pose` left it.
-
-    Returns:
-        The angle [rad], 0 if unknown.
-    """
-    if isinstance(solver, Search):
-        return analytic.tilt_to_limits(problem, work, solver)
-    return _unknown_tilt(problem, work, solver)
-
-
-@inner
-def _unknown_tilt(problem: Problem, work: Workspace, solver: Solver) -> float:
-    return 0.0
-
-
 def look_near(
     problem: Problem, work: Workspace, body_A: FloatArray, least: float, solver: Solver
 ) -> tuple[int, int]:
@@ -318,17 +297,6 @@ class _LookNear(OfSolver):
         NumericSolver: _numeric_look,
         SixJointSolver: six_joints.quick_look,
         FiveJointSolver: _five_joint_look,
-    }
-    entries: ClassVar[dict[Any, Any]] = {}
-
-
-@infer_global(tilt_to_limits)
-class _TiltToLimits(OfSolver):
-    implementations: ClassVar[dict[type, Any]] = {
-        Search: analytic.tilt_to_limits,
-        NumericSolver: _unknown_tilt,
-        SixJointSolver: _unknown_tilt,
-        FiveJointSolver: _unknown_tilt,
     }
     entries: ClassVar[dict[Any, Any]] = {}
 

@@ -21,7 +21,7 @@ from tcs.kernel.analytic.scratch import (
     solve,
     sort_candidates,
 )
-from tcs.kernel.analytic.search import find_candidates, greatest_slack, record_all
+from tcs.kernel.analytic.search import find_candidates, record_all
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, int_constant
 from tcs.kernel.contacts import NO_CONTACT, arm_contact, at_goal
@@ -46,9 +46,6 @@ power here, and rounding joints to float32 costs up to 1e-7."""
 NEARBY = 0.25
 """Range of the free joint about a known solution in which one for a pose next to it is tried, to
 either side [rad]."""
-BETWEEN_SAMPLES, TILT_SLOPE = 0.3, 5.0
-"""What the slack may gain between samples of the free joint, and with the tilt of the tool [1/rad]:
-joint angles change by a few radians per radian of either, and much faster at singularities only."""
 
 
 @inner
@@ -342,26 +339,6 @@ def _best_above(
         return ARM_BLOCKED, contact
     refine(problem, work, body_A, search, winner, REFINEMENTS, -1.0)
     return REACHED, NO_CONTACT
-
-
-@inner
-def tilt_to_limits(problem: Problem, work: Workspace, search: Search) -> float:
-    """Return an angle by which a goal that fails at joint limits may tilt without being reached.
-
-    All samples of the free joint have a joint far beyond its limits.
-
-    Args:
-        problem: The scene.
-        work: Workspace with the goal in place.
-        search: As filled by `out_of_reach`.
-
-    Returns:
-        The angle [rad], 0 if unknown.
-    """
-    if search.arc_count[0] == 0:
-        return 0.0
-    beyond = -greatest_slack(problem.arm, search, search.arc_count[0])
-    return max(beyond - BETWEEN_SAMPLES, 0.0) / TILT_SLOPE
 
 
 @inner

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from tcs.kernel.analytic.arcs import PEAK_SLOPE, is_peak, windows_of
 from tcs.kernel.analytic.intervals import record_fast, record_intervals, record_uncovered
 from tcs.kernel.analytic.samples import MAX_SAMPLES
@@ -87,24 +85,6 @@ def record_all(arm: ArmSolver, search: Search, arcs: int) -> None:
                 stop = search.arcs[k, 0] + search.windows[w, 1] * step
                 fine, spacing = _sample_window(arm, search, b, start, stop)
                 record_intervals(arm, search, b, fine, spacing)
-
-
-@inner
-def greatest_slack(arm: ArmSolver, search: Search, arcs: int) -> float:
-    """Return the greatest slack of the samples of the first pass, on every branch.
-
-    Args:
-        arm: The arm.
-        search: `goal` and `arcs` are read.
-        arcs: Number of arcs, one or more.
-    """
-    length, greatest = _length(search, arcs), -np.inf
-    for k in range(arcs):
-        for b in range(len(arm.branches)):
-            count, _ = _sample_arc(arm, search, b, k, length)
-            for i in range(count):
-                greatest = max(greatest, search.slack[i])
-    return greatest
 
 
 @inner

@@ -35,7 +35,7 @@ from tcs.kernel.scores import (
     TOO_FAR,
     progress_of,
 )
-from tcs.kernel.solvers import THOROUGH, Solver, score_pose, tilt_to_limits
+from tcs.kernel.solvers import THOROUGH, Solver, score_pose
 from tcs.kernel.workspace import Workspace
 
 SCALES = np.array([0.4, 0.2, 0.1])
@@ -59,14 +59,8 @@ ANY = -1.0
 """Bound of a measure that every solution exceeds."""
 UNKNOWN = -2
 """In place of a contact code of the gripper: not looked for yet."""
-ROUNDING = 1e-9
-"""Rounding of a squared tilt [rad^2]."""
 NO_SAMPLE = -1
 """In place of the number of a sample: a tool pose between them."""
-
-
-MOST_HOPELESS = 64
-"""Most tilts that are remembered because all tilts around them fail at joint limits."""
 
 
 class PlacedGoal(NamedTuple):
@@ -163,13 +157,10 @@ def _search_list(
     """
     free = problem.freedom
     worth = np.empty(free.first[goal.list + 1] - free.first[goal.list], np.int64)
-    hopeless = np.zeros((1 + MOST_HOPELESS, 4))
-    top, reason, contact = _try_samples(
-        problem, work, solver, grippers, goal, bounds, worth, hopeless, best
-    )
+    top, reason, contact = _try_samples(problem, work, solver, grippers, goal, bounds, worth, best)
     if top < 0:
         top, reason, contact = _try_next_to(
-            problem, work, solver, grippers, goal, bounds, worth, hopeless, reason, contact
+            problem, work, solver, grippers, goal, bounds, worth, reason, contact
         )
         if top >= 0:
             copy_joints(solver.best, best)
@@ -195,7 +186,6 @@ def _try_samples(
     goal: PlacedGoal,
     bounds: FloatArray,
     worth: IntArray,
-    hopeless: FloatArray,
     best: FloatArray,
 ) -> tuple[int, int, int]:
     """Try the samples of a goal: all that are to be tried, of the others until one reaches it.
@@ -209,7 +199,6 @@ def _try_samples(
         bounds: From `_reach_in_goal`.
         worth: Filled with how many of the poses next to each sample are worth a try: ALL, SOME or
             NONE; shape (samples,).
-        hopeless: Filled with the tilts about which others fail, see `_is_hopeless`.
         best: Filled with the joint angles [rad] at the best sample.
 
     Returns:
@@ -234,14 +223,10 @@ def _try_samples(
                 farthest, reason, contact = came, why, code
             continue
         u = free.u[start + n]
-        if _is_hopeless(hopeless, u):
-            continue
         near = top >= 0 and not any_orientation and (u[1] != 0.0 or u[2] != 0.0)
         if near:
             copy_joints(best, solver.best)
         why, code = _score_at(problem, work, solver, grippers, goal, n, u, least, near)
-        if why == JOINT_LIMITS:
-            _remember(hopeless, u, tilt_to_limits(problem, work, solver))
         if why == REACHED:
             measure = measure_at(problem, solver.best)
             if measure > value:
@@ -266,7 +251,6 @@ def _try_next_to(
     goal: PlacedGoal,
     bounds: FloatArray,
     worth: IntArray,
-    hopeless: FloatArray,
     reason: int,
     contact: int,
 ) -> tuple[int, int, int]:
@@ -280,7 +264,6 @@ def _try_next_to(
         goal: The goal.
         bounds: From `_reach_in_goal`.
         worth: From `_try_samples`.
-        hopeless: From `_try_samples`, and filled on.
         reason: Reason of the sample that came farthest.
         contact: Contact code of that sample.
 
@@ -304,57 +287,13 @@ def _try_next_to(
                 # Tried as a pose next to the other sample.
                 continue
             u = free.u[start + k]
-            if _is_hopeless(hopeless, u):
-                continue
             why, code = _score_at(problem, work, solver, grippers, goal, NO_SAMPLE, u, ANY, False)
             if why == REACHED:
                 return k, why, code
-            if why == JOINT_LIMITS:
-                _remember(hopeless, u, tilt_to_limits(problem, work, solver))
             came = progress_of(why)
             if came > farthest:
                 farthest, reason, contact = came, why, code
     return -1, reason, contact
-
-
-@inner
-def _remember(hopeless: FloatArray, u: FloatArray, radius: float) -> None:
-    """Remember a tilt about which all tilts by up to a radius fail, see `_is_hopeless`."""
-    count = int(hopeless[0, 0])
-    if radius <= 0.0 or count == MOST_HOPELESS or not _is_tilt(u):
-        return
-    hopeless[0, 0] += 1.0
-    found = hopeless[1 + count]
-    found[0], found[1], found[2] = u[1], u[2], radius
-    found[3] = u[1] * u[1] + u[2] * u[2]
-
-
-@inner
-def _is_hopeless(hopeless: FloatArray, u: FloatArray) -> bool:
-    """Return whether a tool pose is a tilt close to one that fails far beyond joint limits.
-
-    A cone that contains it has tried that one, too, which is tilted no farther: a wider one leaves
-    out no more.
-
-    Args:
-        hopeless: Their number, then the two parameters of each tilt, the radius about it and its
-            squared angle, shape (1 + MOST_HOPELESS, 4).
-        u: Parameters of the tool pose, shape (PARAMETERS,).
-    """
-    if hopeless[0, 0] == 0.0 or not _is_tilt(u):
-        return False
-    square = u[1] * u[1] + u[2] * u[2]
-    for n in range(1, 1 + int(hopeless[0, 0])):
-        x, y, radius = u[1] - hopeless[n, 0], u[2] - hopeless[n, 1], hopeless[n, 2]
-        if x * x + y * y <= radius * radius and hopeless[n, 3] <= square + ROUNDING:
-            return True
-    return False
-
-
-@inner
-def _is_tilt(u: FloatArray) -> bool:
-    """Return whether only the tilt of a tool pose differs from the nominal one."""
-    return u[0] == 0.0 and u[3] == 0.0 and u[4] == 0.0 and u[5] == 0.0
 
 
 @inner

@@ -96,7 +96,9 @@ def approach_hindrance(job: Job) -> str:
             "approaches are scored for one arm, but goals of this task are reached by two at the "
             "same time"
         )
-    if job.task.has_freedom and len(job.spec.robot.arm_joints) > FEWEST_JOINTS:
+    several = any(goal.alternatives for goal in job.task.goals)
+    joints = len(job.spec.robot.arm_joints)
+    if several or (job.task.has_freedom and joints > FEWEST_JOINTS):
         return "approaches are scored for goals of a single pose, but goals of this task are free"
     try:
         job.spec.robot.arm_rates()
