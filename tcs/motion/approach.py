@@ -16,7 +16,8 @@ from tcs.kernel.motion.straight import (
     new_straight_workspace,
     next_straight,
 )
-from tcs.model.tasks import TOOL_SPEED, Goal, ToolLine
+from tcs.kernel.postures import tool_poses
+from tcs.model.tasks import TOOL_SPEED, ToolLine
 from tcs.motion.curves import Curve
 from tcs.motion.stops import BodyPair, Stop
 
@@ -111,28 +112,44 @@ class _Search:
         stop, goal = self.stop, self.goal
         begin = self.p_AG - self.R_AG @ goal.approach.offset if forwards else self.p_AG
         line = goal.approach if forwards else goal.approach.reverse()
-        postures = postures_at(stop.problem, self.R_AG, begin, samples, may_turn=_may_turn(goal))
-        search = self._search(postures, line, self.before if forwards else self.at_goal)
-        n = 0
-        while n < len(postures):
-            n, curve = self._next(search, line, n)
-            if curve is not None:
-                curve = curve if forwards else curve.reverse()
-                away = self._retreat(curve)
-                if away is not None:
-                    yield Access(approach=curve, retreat=away)
+        may_turn = not forwards and goal.free is not None and goal.free.rotates
+        postures = postures_at(stop.problem, self.R_AG, begin, samples, may_turn=may_turn)
+        contacts = self.before if forwards else self.at_goal
+        for q, R_AT in self._by_direction(postures):
+            search, n = self._search(q, R_AT, line, contacts), 0
+            while n < len(q):
+                n, curve = self._next(search, line, n)
+                if curve is not None:
+                    curve = curve if forwards else curve.reverse()
+                    away = self._retreat(curve, R_AT)
+                    if away is not None:
+                        yield Access(approach=curve, retreat=away)
 
-    def _retreat(self, approach: Curve) -> Curve | None:
+    def _by_direction(self, postures: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+        """Return postures with the same orientation of the tool, and that, shape (3, 3).
+
+        An arm of five joints rotates its tool at a goal, and its lines with it.
+        """
+        problem, count = self.stop.problem, len(postures)
+        if not np.any(problem.turn):
+            return [(postures, self.R_AG)]
+        R_AT, p_AT = np.empty((count, 3, 3)), np.empty((count, 3))
+        tool_poses(problem.chain_R, problem.chain_p, postures, R_AT, p_AT)
+        return [(postures[n : n + 1], R_AT[n]) for n in range(count)]
+
+    def _retreat(self, approach: Curve, R_AT: FloatArray) -> Curve | None:
         """Return the retreat from the end of an approach, None if there is none."""
         goal = self.goal
         if goal.retreat == goal.approach.reverse():
             return approach.reverse()
-        search = self._search(approach.q[-1:].copy(), goal.retreat, self.before)
+        search = self._search(approach.q[-1:].copy(), R_AT, goal.retreat, self.before)
         return self._next(search, goal.retreat, 0)[1]
 
-    def _search(self, q: FloatArray, line: ToolLine, contacts: IntArray) -> StraightSearch:
+    def _search(
+        self, q: FloatArray, R_AT: FloatArray, line: ToolLine, contacts: IntArray
+    ) -> StraightSearch:
         """Return the search for straight motions from postures, shape (n, 7)."""
-        offset = np.ascontiguousarray(self.R_AG @ line.offset)
+        offset = np.ascontiguousarray(R_AT @ line.offset)
         fastest = self.stop.velocity * (line.distance / TOOL_SPEED)
         return StraightSearch(q, offset, fastest, self.outcomes, contacts)
 
@@ -156,15 +173,6 @@ class _Search:
         if self.outcomes[LIMITS]:
             return Accesses((), "approach_limits", None)
         return Accesses((), "unreached", self.stop.most_frequent(self.at_goal))
-
-
-def _may_turn(goal: Goal) -> bool:
-    """Return whether a goal is the same, with its lines, from all sides of an axis."""
-    lines = goal.approach.offset, goal.retreat.offset
-    free = goal.free
-    if free is None or goal.alternatives:
-        return False
-    return free.rotates and not np.any(np.cross(lines, free.axis).round(9))
 
 
 def _spread(stop: Stop, found: list[Access]) -> tuple[Access, ...]:

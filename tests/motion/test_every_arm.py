@@ -13,6 +13,7 @@ from tcs.files.paths import data_folder
 from tcs.motion import check_plan, evaluate_plan, load_plan, save_plan
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+SHAVING = data_folder() / "tasks" / "adl" / "shaving.yaml"
 
 
 def at(x, y, yaw, torso=0.0):
@@ -20,30 +21,39 @@ def at(x, y, yaw, torso=0.0):
 
 
 CASES = {
-    "six joints": ("ur5", 0, at(1.0, -0.6, 0), "shoulder_pan_joint"),
-    "prismatic joints": ("stretch", 2, at(1.1, 0.6, 315), "drive"),
+    "six joints": ("ur5", "wheelchair", SHAVING, 0, at(1.0, -0.6, 0), "shoulder_pan_joint"),
+    "prismatic joints": ("stretch", "wheelchair", SHAVING, 2, at(1.1, 0.6, 315), "drive"),
+    "five joints, free goal": (
+        EXAMPLES / "so101.yaml",
+        EXAMPLES / "arm_on_the_table.yaml",
+        EXAMPLES / "feeding_from_any_side.yaml",
+        0,
+        at(0.78, 0.2, 180),
+        "shoulder_pan",
+    ),
 }
-"""Robot, goal of shaving, configuration, and first joint."""
+"""Robot, environment, task, goal, configuration, and first joint."""
 
 
 @pytest.fixture(scope="module", params=CASES)
 def planned(request, tmp_path_factory):
     """The plan of one goal, and the name of the arm's first joint."""
-    robot, goal, only, first = CASES[request.param]
-    task = yaml.safe_load((data_folder() / "tasks" / "adl" / "shaving.yaml").read_text())
+    robot, environment, given, goal, only, first = CASES[request.param]
+    task = yaml.safe_load(given.read_text())
     task["goals"] = [task["goals"][goal]]
-    path = tmp_path_factory.mktemp("arm") / "shaving.yaml"
+    path = tmp_path_factory.mktemp("arm") / given.name
     path.write_text(yaml.safe_dump(task))
-    file = tcs.score(path, "wheelchair", robot, jobs=1, only=only, approach=False)
+    file = tcs.score(path, environment, robot, jobs=1, only=only, approach=False)
     return tcs.plan(file, [0]), first
 
 
 def test_the_goal_is_done_and_drake_refutes_nothing(planned, tmp_path):
     plan, first = planned
-    assert (plan.goals_done, plan.false, plan.joints[0], len(plan.joints)) == (1, 0, first, 6)
+    count = 5 if first == "shoulder_pan" else 6
+    assert (plan.goals_done, plan.false, plan.joints[0], len(plan.joints)) == (1, 0, first, count)
     (stop,) = plan.stops
     assert stop.returns
-    assert all(s.timing.positions.shape[1] == 6 for s in stop.segments)
+    assert all(s.timing.positions.shape[1] == count for s in stop.segments)
     path = tmp_path / "plan.json"
     save_plan(path, plan)
     found = check_plan(load_plan(path))
