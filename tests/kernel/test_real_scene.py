@@ -102,7 +102,7 @@ def test_the_kernel_agrees_with_drake_at_margins_of_its_own(spec, shaving, full_
     lowered = lower(scene, shaving, one)
     arrays, grid = lowered.arrays, lowered.grid
     rng = np.random.default_rng(0)
-    postures = np.array([random_posture(rng, arrays.chain) for _ in range(120)])
+    postures = np.array([random_posture(rng, arrays.chain) for _ in range(50)])
     problem = build_problem(with_goals(arrays, grid, 0, postures))
     work = new_workspace(problem)
     scene.place_base(where["base_x"], where["base_y"], np.deg2rad(where["base_yaw"]))
@@ -113,7 +113,7 @@ def test_the_kernel_agrees_with_drake_at_margins_of_its_own(spec, shaving, full_
         free = posture_contact(problem, work, rows_at(grid, [0]), g, q) == NO_CONTACT
         found.append((free, not scene.violations()))
     kernel, drake = np.array(found).T
-    assert 20 < kernel.sum() < 112
+    assert 8 < kernel.sum() < 47
     np.testing.assert_array_equal(kernel, drake)
 
 

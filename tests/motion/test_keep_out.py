@@ -43,7 +43,7 @@ def test_kernel_and_drake_have_the_same_wall(stop, rng):
     lower, upper = walled.arm_limits
     lower, upper = np.maximum(lower, -np.pi), np.minimum(upper, np.pi)
     touched = 0
-    for _ in range(60):
+    for _ in range(30):
         q = rng.uniform(lower, upper)
         walled.set_arm(q)
         found = [contact for contact in walled.violations() if contact[1].startswith("keep_out")]

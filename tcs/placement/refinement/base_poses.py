@@ -159,7 +159,7 @@ def _best(scorer: PoseScorer, scene: PoseScene, fineness: Fineness) -> list[Scor
     order = np.lexsort((-scores.dexterity.mean(axis=1), -counts))
     goals = scorer.problem.goals
     if counts[order[0]] == goals:
-        found = [ScoredBase(values[few[i]], *(array[i] for array in scores)) for i in order]
+        found = [ScoredBase(values[few[i]], *(array[i] for array in scores[:3])) for i in order]
     else:
         found = _refined(scorer, [(int(few[i]),) for i in order[:STARTS]])
     most = max(int(base.reached.sum()) for base in found)
@@ -190,7 +190,8 @@ def _refined(scorer: PoseScorer, starts: Sequence[tuple[int, ...]]) -> list[Scor
         missed = np.setdiff1d(np.flatnonzero(~scores.reached[best]), chosen)
         if not missed.size:
             return [
-                ScoredBase(values[i], *(array[i] for array in scores)) for i in range(len(values))
+                ScoredBase(values[i], *(array[i] for array in scores[:3]))
+                for i in range(len(values))
             ]
 
 

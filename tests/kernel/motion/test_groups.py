@@ -143,12 +143,12 @@ def test_a_scene_is_placed_at_every_configuration(many, chain, rng):
             # Placing again replaces where the environment was.
             scene = placed(scene, problem, rows_at(grid, [h]))
             work, reference = new_motion_workspace(scene), placed_scene(many, grid, h, 0)[0]
-            for _ in range(12):
+            for _ in range(6):
                 q = within_limits(rng, chain)
                 touches = least_excess(reference, q) < 0.0
                 assert (posture_contact(scene, work, q) != NO_PAIR) == touches
                 judged.append(touches)
-    assert 5 < sum(judged) < len(judged) - 5
+    assert 2 < sum(judged) < len(judged) - 2
 
 
 def shapes_in(scene, box):
@@ -219,7 +219,7 @@ def test_the_motion_of_shapes_in_boxes_is_bounded(many, chain, rng):
     scene = grouped(motion_scene(build_problem(many), rows_at(toy_grid(), [HERE])))
     assert np.count_nonzero(scene.root != np.arange(len(scene.root))) > 50
     work, closer = new_motion_workspace(scene), []
-    for _ in range(30):
+    for _ in range(12):
         start = within_limits(rng, chain)
         control = start + np.linspace(0.0, 1.0, 4)[:, None] * rng.normal(size=7) * 0.1
         control[1:3] += rng.normal(size=(2, 7)) * 0.01

@@ -54,7 +54,7 @@ def test_shapes_with_a_plane_between_them_do_not_meet(rng, pieces, bent, back):
     for seed in range(3):
         scene, work, _ = toy(chain, seed, obstacles=40)
         plane, meets = np.zeros((2, len(scene.pair)), np.bool_)
-        for _ in range(80):
+        for _ in range(40):
             start = within_limits(rng, chain)
             step = rng.normal(size=7) * (back or 0.3)
             along = np.linspace(0.0, 1.0, 3 * pieces + 1)[:, None]
@@ -69,8 +69,8 @@ def test_shapes_with_a_plane_between_them_do_not_meet(rng, pieces, bent, back):
             planes += np.count_nonzero(plane)
             tight += np.count_nonzero(meets)
     # Both verdicts are frequent, or the test would show nothing.
-    assert planes > 1000
-    assert tight > 100
+    assert planes > 500
+    assert tight > 50
 
 
 @numba.njit(error_model="numpy")

@@ -75,7 +75,7 @@ def test_threads_on_one_live_scorer(tmp_path_factory):
         write_environment(tmp_path_factory.mktemp("live"), "live", CORNER),
         approach=False,
     )
-    observed = [{"person_y": 0.004 * i} for i in range(-8, 8)]
+    observed = [{"person_y": 0.008 * i} for i in range(-4, 4)]
     alone = [digest(scorer.score(one)) for one in observed]
     assert len(set(alone)) > len(alone) / 2
     with ThreadPoolExecutor(THREADS) as pool:

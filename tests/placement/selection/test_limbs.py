@@ -140,11 +140,12 @@ def test_obstacles_block_the_solutions_of_every_table(file):
     free = []
     for one in tables:
         everyone = np.ones(len(one.sets.candidates), dtype=np.bool_)
-        hit = blocked_solutions(box, one.postures, everyone)
-        pairs = zip(*one.postures.pairs, hit, strict=True)
+        (postures,) = one.postures
+        hit = blocked_solutions(box, postures, everyone)
+        pairs = zip(*postures.pairs, hit, strict=True)
         free.append({(int(one.sets.candidates[c]), int(g)) for c, g, is_hit in pairs if not is_hit})
     candidates = tables[0].sets.candidates
-    standing = ~blocked_bodies(box, tables[0].postures)
+    standing = ~blocked_bodies(box, tables[0].postures[0])
     own = {0: free[1], 3: free[1], 1: free[2], 4: free[2], 2: free[0]}
     for c, h in enumerate(candidates.tolist()):
         expected = [(h, g) in free[0] and (h, g) in own[g] for g in range(5)]
