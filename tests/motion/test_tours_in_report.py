@@ -29,7 +29,7 @@ def _fewer_postures():
 @pytest.fixture(scope="module")
 def measured(planned, two_goals, _fewer_postures):
     _, scene, _ = rebuild_scenes(tcs.load(two_goals))[0]
-    return Tours.of(planned, scene)
+    return Tours.of(planned, {"": scene})
 
 
 def test_clearances_are_least_at_the_goal_and_never_below_what_is_required(measured, planned):

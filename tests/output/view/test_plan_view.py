@@ -56,7 +56,8 @@ def moved():
 
 @pytest.fixture
 def view(moved, scene, shaving):
-    return PlanView(moved, SceneShapes(scene, shaving, meshes=False), "Shaving", "BSD", False, True)
+    shapes = SceneShapes(scene, shaving, meshes=False)
+    return PlanView(moved, shapes, "Shaving", "BSD", False, True, {"": scene})
 
 
 def test_frames_follow_the_timing(moved):

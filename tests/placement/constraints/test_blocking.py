@@ -50,7 +50,7 @@ def drake(corner):
 def test_obstacles_block_what_drake_finds_in_contact(corner, drake):
     file, job = corner
     tables = SelectionTables.of(file)
-    postures = tables.postures
+    (postures,) = tables.postures
     pairs = postures.pairs
     bodies = np.stack([blocked_bodies(obstacle, postures) for obstacle in OBSTACLES])
     everyone = np.ones(len(tables.sets.candidates), dtype=np.bool_)

@@ -50,9 +50,9 @@ def run(file, tmp_path, monkeypatch):
     """Function that evaluates with small blocks; the answer, and the number of people evaluated."""
     evaluated, evaluate = [], outcomes._evaluated
 
-    def counted(prepared, scales, batch, first):
+    def counted(prepared, scales, batch, *others):
         evaluated.extend(batch.tolist())
-        return evaluate(prepared, scales, batch, first)
+        return evaluate(prepared, scales, batch, *others)
 
     monkeypatch.setattr(outcomes, "BLOCK", 2)
     monkeypatch.setattr(outcomes, "_evaluated", counted)

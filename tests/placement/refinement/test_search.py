@@ -42,7 +42,7 @@ def test_members_that_add_something_stay():
 def test_members_stay_where_the_condition_needs_them():
     walk = walk_of([[0.1, 0.2], [0.3, 0.2], [0.0, 0.1]])
     found = without_idle_members(
-        walk, ScoreObjective(WEIGHTS), lambda sets: np.array([len(s.values) > 1 for s in sets])
+        walk, ScoreObjective(WEIGHTS), lambda sets: np.array([len(s) > 1 for s in sets])
     )
     # The first to go is the first without which nothing is lost.
     assert found.origin == (11, 12)
