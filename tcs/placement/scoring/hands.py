@@ -26,15 +26,15 @@ if TYPE_CHECKING:
     from tcs.placement.scoring.offline import Scored, ScoringSetup
 
 NEARNESS = np.empty(len(Reason), np.uint8)
-"""How near each reason is to reaching the goal, in the order of the checks."""
+"""How near each reason is to reaching the goal, as `tcs.kernel.scores.progress_of` has it."""
 NEARNESS[
     [
         Reason.EXCLUDED,
         Reason.BODY_BLOCKED,
         Reason.TOO_FAR,
-        Reason.JOINT_LIMITS,
         Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT,
         Reason.GRIPPER_BLOCKED_BY_ROBOT,
+        Reason.JOINT_LIMITS,
         Reason.ARM_BLOCKED,
         Reason.APPROACH_LIMITS,
         Reason.APPROACH_BLOCKED,
