@@ -12,8 +12,7 @@ from tcs.errors import SelectionError
 from tcs.model.grid import InitialConfiguration
 from tcs.placement.reasons.distribution import Distribution
 from tcs.placement.reasons.explained import ExplainedConfiguration
-from tcs.placement.reasons.fix import Fix, fix_weights, nearest_fix
-from tcs.placement.reasons.of_hands import with_hand
+from tcs.placement.reasons.fix import Fix, fix_weights, nearest_fix, with_hand
 from tcs.placement.selection import (
     Match,
     SelectionTables,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from tcs.placement.reasons.explained import ExplainedConfiguration
 from tcs.placement.selection import TravelWeights
 from tcs.placement.selection.distances import Distances, LatticeDistances, StraightDistances
 from tcs.placement.selection.travel import legs_from
+from tcs.placement.store import ScoreFile
 from tcs.placement.tables import BaseLattice, Reason, ScoreTable, tc_manipulability, tc_reachability
 
 TURN_WEIGHT = 0.3
@@ -194,6 +195,17 @@ def nearest_fix(
         lost=tuple(np.flatnonzero(held & ~kept[best]).tolist()),
     )
     return fix, unreachable
+
+
+def with_hand(
+    file: ScoreFile, scores: ScoreTable, goal: int, fix: Fix | None, start: ExplainedConfiguration
+) -> Fix | None:
+    """Return the fix with the hand to use, if it is another one than the explained one."""
+    if fix is None or scores.hand is None or scores.hand[fix.index, goal] == start.hand:
+        return fix
+    entry = file.hands[int(scores.hand[fix.index, goal])]
+    arm = f"{entry['arm']} arm" if entry["arm"] else "bare hand"
+    return replace(fix, hand=" with ".join(filter(None, (arm, entry["tool"]))))
 
 
 def _distances(

@@ -8,7 +8,7 @@ import numpy as np
 
 from tcs.errors import SelectionError, UnknownNameError
 from tcs.placement.reasons import Explanation
-from tcs.placement.reasons.of_hands import with_hand
+from tcs.placement.reasons.fix import with_hand
 from tcs.placement.refinement.points import PointScorer
 from tcs.placement.tables import Reason
 

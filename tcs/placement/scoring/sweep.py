@@ -77,8 +77,8 @@ def sweep(
         on_progress: Called with the number of scored configurations and their total.
         on_compile: Called first, if there is no cached machine code.
         excluded: Configurations that are not scored, shape (configurations,); None for none.
-        approaches: The approaches of the goals, to score approachable postures only, for an arm
-            with a closed form and goals of a single pose; None to score all postures.
+        approaches: The approaches of the goals, to score approachable postures only; None to score
+            all postures.
         blocks: Folder to keep finished blocks of the grid in, and to take them from; None to keep
             none.
         engine: Who scores, without the approaches; None for `jobs` threads of this process.

@@ -3,6 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+import tcs
 from tcs.errors import ArmClassError, RobotError, TaskError, UnknownNameError
 from tcs.model.tasks import load_task, partners
 from tcs.output.report.score.pictures import scene_figure
@@ -97,6 +98,11 @@ def test_both_arms_are_checked_against_each_other_off_the_grid_and_under_error(p
     reached = Trials.of(pair).reached(members, {"person_x": np.zeros(1)})
     np.testing.assert_array_equal(reached[:, 0], scores.reached[members])
     assert np.any(scores.reason[members] == Reason.OTHER_GOAL_UNREACHED)
+
+
+def test_motions_of_two_arms_at_once_are_refused(pair):
+    with pytest.raises(TaskError, match=r"one arm moves at a time\. Leave 'together_with' out"):
+        tcs.plan(pair, [int(pair.nominal.sets.candidates[0])])
 
 
 def test_names_and_sides_of_a_pair_do_not_matter(pair, beside, tmp_path):
