@@ -32,7 +32,6 @@ from tcs.placement.selection.penalties import Penalties, penalties_of
 from tcs.placement.selection.ranking import Ranking, ranking_of
 from tcs.placement.selection.refined import RefinedQuery, grid_only
 from tcs.placement.selection.search import best_set
-from tcs.placement.selection.starts import starts_of
 from tcs.placement.selection.travel import Legs, TravelWeights, legs_from, shortest_tour
 from tcs.placement.selection.utility import UtilityWeights, utility
 from tcs.placement.store import MotionFile, ScoreFile
@@ -259,11 +258,6 @@ class _Query:
         legs, weights, to_gain = self.legs, self.ranking.weights, self.ranking.to_gain
         if weights.success > 0.0:
             return self._best_estimated(distinct, max_members)
-        if distinct is None and self.found is None and not to_gain:
-            starts = starts_of(self.tables.index, legs, weights, self.penalties)
-            shared = None if starts is None else starts.best(legs.here_to_cell, max_members)
-            if shared is not None:
-                return shared
         singles = self.singles.copy()
         if distinct is not None:
             singles[~distinct.of_sets((np.arange(singles.size),))] = -np.inf

@@ -14,14 +14,18 @@ from numpy.typing import NDArray
 
 from tcs.placement.selection.admission import Admitted
 from tcs.placement.selection.alternatives import Distinct
-from tcs.placement.selection.index import GroupIndex
-from tcs.placement.selection.lowered import SLACK, LoweredScores
+from tcs.placement.selection.index import GroupIndex, SetIndex
 from tcs.placement.selection.penalties import Penalties
 from tcs.placement.selection.travel import Legs
 from tcs.placement.selection.utility import UtilityWeights
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+
+SLACK = 1e-12
+"""Relative margin for rounding in bounds that are not computed by the operations of the utility: a
+dozen roundings of 1.1e-16 each, with three digits to spare. A bound without it could end up one
+bit below the utility it bounds, and lose a tie."""
 
 
 @dataclass(frozen=True)
@@ -75,10 +79,6 @@ class Bounds:
         A tour drives to the nearest of its cells, and from there through the others. It is computed
         by other operations than `groups`, and may be less by the rounding.
         """
-        return np.asarray(self.from_cells() - self.travel * self.legs.here_to_cell)
-
-    def from_cells(self) -> FloatArray:
-        """Return the same without the drive to each cell, shape (N,)."""
         legs, index = self.legs, self.index
         per_metre = self.travel * legs.metre
         weights = (float(self.weights.reachability), float(self.weights.manipulability))
@@ -86,7 +86,7 @@ class Bounds:
             (*weights, per_metre, type(legs.distances)),
             lambda: self._gain(*index.group_scores) - per_metre * index.path(legs.distances),
         )
-        return np.where(legs.reachable, most, -np.inf)
+        return np.where(legs.reachable, most - self.travel * legs.here_to_cell, -np.inf)
 
     def of_member(self, group: IntArray, member: IntArray) -> FloatArray:
         """Return bounds on the sets of a group that contain a candidate, shape (n,)."""
@@ -218,3 +218,59 @@ class Bounds:
         if self.penalties is not None:
             most += sum(self.penalties.amounts)
         return SLACK * (most + self.travel * self._driving)
+
+
+@dataclass(frozen=True, eq=False)
+class LoweredScores:
+    """What the candidates still reach under constraints, with bounds on the sets of cells.
+
+    At each goal a set gains the greatest alpha reached + beta dexterity of its members, because
+    only a goal that is reached has a dexterity. The greatest of a cell bounds all its candidates.
+    """
+
+    dexterity: FloatArray
+    """Dexterity of the candidates, one contiguous row for each goal, shape (G, C)."""
+    reached: NDArray[np.bool_]
+    """Whether a goal is reached, one contiguous row for each goal, shape (G, C)."""
+    gain: FloatArray
+    """Weight of the goal times (alpha reached + beta dexterity), shape (G, C)."""
+    cell_gain: FloatArray
+    """The greatest of the admitted candidates of each cell, shape (G, N)."""
+
+    @classmethod
+    def of(cls, index: SetIndex, admitted: Admitted, weights: UtilityWeights) -> LoweredScores:
+        """Return the scores of admitted candidates.
+
+        Args:
+            index: The candidates.
+            admitted: What they reach.
+            weights: alpha and beta.
+        """
+        dexterity = np.ascontiguousarray(admitted.dexterity.T, dtype=np.float64)
+        reached = np.ascontiguousarray(admitted.reached.T)
+        gain = float(weights.reachability) * reached + float(weights.manipulability) * dexterity
+        gain *= index.sets.weights[:, None] * (1.0 + SLACK)
+        of_admitted = np.where(admitted.candidates, gain, 0.0)[:, index.sets.by_cell]
+        return cls(dexterity, reached, gain, np.maximum.reduceat(of_admitted, index.start, axis=1))
+
+    def of_cells(self, cells: tuple[IntArray, ...]) -> FloatArray:
+        """Return bounds on alpha P_R + beta P_M of sets with a member in each cell, shape (n,)."""
+        total = np.zeros(cells[0].size)
+        for of_goal in self.cell_gain:
+            total += _greatest([of_goal[of_member] for of_member in cells])
+        return total
+
+    def with_partners(self, member: IntArray, cells: tuple[IntArray, ...]) -> FloatArray:
+        """Return the same for sets of a candidate and a partner in each cell, shape (n,)."""
+        total = np.zeros(member.size)
+        for of_candidates, of_goal in zip(self.gain, self.cell_gain, strict=True):
+            partners = [of_goal[of_member] for of_member in cells]
+            total += _greatest([of_candidates[member], *partners])
+        return total
+
+
+def _greatest(values: list[FloatArray]) -> FloatArray:
+    greatest = values[0]
+    for other in values[1:]:
+        greatest = np.maximum(greatest, other)
+    return greatest

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +26,6 @@ class SetIndex:
 
     sets: SetTable
     """The table."""
-    starts: dict[Hashable, Any] = field(default_factory=dict, repr=False)
-    """What `tcs.placement.selection.starts` keeps, by kind of selection, the latest last."""
 
     @cached_property
     def groups(self) -> tuple[GroupIndex, ...]:

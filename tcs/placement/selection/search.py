@@ -9,8 +9,7 @@ the scores of the others are computed.
 from __future__ import annotations
 
 import itertools
-import sys
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -99,22 +98,6 @@ def _best_among(bounds: Bounds, to_beat: float, best: Found | None) -> Found | N
     return search.best
 
 
-def near_best_sets(bounds: Bounds, margin: float) -> list[tuple[int, ...]]:
-    """Return the members of the kept sets whose utility is near the greatest, in no order.
-
-    Args:
-        bounds: Bounds on the utility of the sets.
-        margin: Greatest difference from it.
-    """
-    search = _SearchNearBest(bounds, -sys.float_info.max, None, margin)
-    search.run()
-    return [
-        tuple(int(member[row]) for member in members)
-        for utilities, members in search.found
-        for row in np.flatnonzero(utilities >= search.least)
-    ]
-
-
 @dataclass
 class _Search:
     """The best set found so far."""
@@ -131,16 +114,12 @@ class _Search:
     def run(self) -> None:
         """Examine the groups that may hold a better set, those with the greatest bounds first."""
         bounds, budget = self.bounds, FIRST_CANDIDATES
-        remaining = self.promising(np.flatnonzero(bounds.groups > self.to_beat))
+        remaining = _promising(bounds, np.flatnonzero(bounds.groups > self.to_beat), self.best)
         while remaining.size:
             now, remaining = _split(bounds, remaining, budget)
             self.open(now)
-            remaining = self.promising(remaining)
+            remaining = _promising(bounds, remaining, self.best)
             budget = min(3 * budget, MOST_CANDIDATES)
-
-    def promising(self, remaining: IntArray) -> IntArray:
-        """Return the groups that may hold a better set, or an equal one earlier in the order."""
-        return _promising(self.bounds, remaining, self.best)
 
     def record(self, utilities: FloatArray, members: tuple[IntArray, ...]) -> None:
         """Compare kept sets with the best one so far; there is at least one."""
@@ -212,29 +191,6 @@ class _Search:
         if not np.all(keep):
             which, members = which[keep], tuple(member[keep] for member in members)
         self._join(groups, which, members, feasible)
-
-
-@dataclass
-class _SearchNearBest(_Search):
-    """All sets found so far that may be near the best one."""
-
-    margin: float = 0.0
-    found: list[tuple[FloatArray, tuple[IntArray, ...]]] = field(default_factory=list)
-
-    @property
-    def least(self) -> float:
-        """The utility that a set must have to be examined."""
-        return self.to_beat if self.best is None else self.best.utility - self.margin
-
-    def promising(self, remaining: IntArray) -> IntArray:
-        """Return the groups that may hold a set near the best one."""
-        return remaining[self.bounds.groups[remaining] >= self.least]
-
-    def record(self, utilities: FloatArray, members: tuple[IntArray, ...]) -> None:
-        """Compare kept sets with the best one so far, and keep those near it."""
-        super().record(utilities, members)
-        near = utilities >= self.least
-        self.found.append((utilities[near], tuple(member[near] for member in members)))
 
 
 def _split(bounds: Bounds, remaining: IntArray, budget: int) -> tuple[IntArray, IntArray]:
