@@ -31,6 +31,9 @@ LONGEST_NAME = 60
 MOST_POSES = 100
 """Greatest number of poses of one goal; each takes the time of a goal of its own."""
 
+UNIT_ROUNDING = 1e-15
+"""By how much the length of a normalised quaternion may differ from 1: four times rounding."""
+
 TOOL_SPEED = 0.1
 """Speed of the tool on straight motions [m/s], at which the velocity limits must be kept: a hand's
 width in a second, slow enough for a person to turn away."""
@@ -102,7 +105,9 @@ class GoalPose:
                 f"field 'quaternion_wxyz' has length {length:.6g}, but must be a unit quaternion "
                 f"(1 within {UNIT_TOLERANCE:g})."
             )
-        quaternion = quaternion / length
+        # Dividing again would turn the pose by a last digit: what is copied keeps every bit.
+        if abs(length - 1.0) > UNIT_ROUNDING:
+            quaternion = quaternion / length
         for array in (position, quaternion):
             array.flags.writeable = False
         object.__setattr__(self, "position", position)

@@ -1,3 +1,4 @@
+import dataclasses
 import math
 import pickle
 
@@ -42,6 +43,16 @@ def test_quaternion_is_normalised():
     written = np.array([0.5, 0.5, 0.5, 0.5]) * (1 + 7e-6)
     length = np.linalg.norm(goal(quaternion=written).quaternion)
     assert length == pytest.approx(1.0, abs=4e-16)  # rounding of one division
+
+
+def test_a_copied_goal_has_the_same_bits():
+    """Goals are read from files as poses first, then copied: scores depend on the last digit."""
+    for written in np.random.default_rng(0).normal(size=(200, 4)):
+        once = written / np.linalg.norm(written) * (1 + 7e-6)
+        made = goal(quaternion=once)
+        again = dataclasses.replace(made, weight=2.0)
+        assert again.quaternion.tobytes() == made.quaternion.tobytes()
+        assert made.quaternion.tobytes() == (once / math.hypot(*once)).tobytes()
 
 
 def test_arrays_are_read_only_copies():
