@@ -358,7 +358,7 @@ def _scene(path: Path, _: int) -> Scored:
 
 def _urdf(path: Path, number: int) -> Scored:
     """Draft a robot from one URDF in ten, and build the scene of every one."""
-    from tcs.model.robots.draft import draft_robot
+    from tcs_shapes.draft import draft_robot
 
     if number % 10 == 0:
         draft_robot(str(path), "iiwa_link_ee_kuka")
@@ -367,8 +367,8 @@ def _urdf(path: Path, number: int) -> Scored:
 
 def _mesh(path: Path, number: int) -> None:
     """Convert a mesh for Drake, and fit primitives to one in ten."""
-    from tcs.model.robots.fitting.covering import Target, fit_triangles
     from tcs.model.robots.urdf.meshes import as_obj
+    from tcs_shapes.covering import Target, fit_triangles
 
     for body, triangles in _read_mesh(path).items():
         if number % 10 == 0:

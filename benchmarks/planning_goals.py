@@ -17,10 +17,10 @@ from collections import Counter, defaultdict
 import coal
 import numpy as np
 from planning_problems import Obstacle, Problem, planning_problems, robot_of_problems
-from shapes import MARGIN, Bodies, Poses, _distance, _geometry, body_poses
 from table import header, parser, record, row, save
 
-from tcs.model.robots.self_collision import SelfCollision
+from shapes import MARGIN, Bodies, Poses, _distance, _geometry, body_poses
+from tcs_shapes.self_collision import SelfCollision
 
 
 def main() -> None:

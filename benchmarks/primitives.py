@@ -13,8 +13,8 @@ import numpy as np
 from table import cell, header, parser, record, row, save
 
 from tcs.model.robots import RobotFile, load_robot
-from tcs.model.robots.fitting.enclosure import enclosure
-from tcs.model.robots.self_collision import SelfCollision, sample_positions
+from tcs_shapes.bodies import enclosure
+from tcs_shapes.self_collision import SelfCollision, sample_positions
 
 TORSO = {"pr2": (0.0115, 0.15, 0.30)}
 """Torso heights of the self-collision test [m]; others stand at the middle of the range."""

@@ -28,11 +28,11 @@ from tcs.kernel.collide import BOUND, CENTRE, ROTATION, closer
 from tcs.model.robots import Primitive, RobotFile, load_robot, robot_names
 from tcs.model.robots.distances import tables_in_force
 from tcs.model.robots.extras import model_with_extras
-from tcs.model.robots.fitting.enclosure import surfaces_to_enclose
-from tcs.model.robots.self_collision import sample_positions
-from tcs.model.robots.self_collision.blocked_at_boxes import packed
 from tcs.model.robots.urdf import Urdf
 from tcs.model.robots.urdf.surfaces import body_triangles, welded_top
+from tcs_shapes.blocked import packed
+from tcs_shapes.bodies import surfaces_to_enclose
+from tcs_shapes.self_collision import sample_positions
 
 FloatArray = NDArray[np.float64]
 BodyPair = tuple[str, str]

@@ -34,7 +34,9 @@ def main() -> int:
     run([python, *pip, "install", "--quiet", str(wheel)])
     with tempfile.TemporaryDirectory() as folder:
         examples = Path(shutil.copytree(CHECKOUT / "examples", Path(folder) / "examples"))
-        where = run([python, "-c", "import tcs; print(tcs.__file__)"], cwd=examples).strip()
+        where = run(
+            [python, "-c", "import tcs, tcs_shapes; print(tcs.__file__)"], cwd=examples
+        ).strip()
         if not Path(where).is_relative_to(out):
             print(f"tcs was imported from '{where}', not from the wheel.", file=sys.stderr)
             return 1

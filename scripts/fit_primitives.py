@@ -51,20 +51,14 @@ from tcs.model.robots import (
     write_primitives,
 )
 from tcs.model.robots.distances import read_tables, write_tables
-from tcs.model.robots.fitting import (
-    Part,
-    Spots,
-    Target,
-    enclose_axis,
-    fit_robot,
-    refit,
-    refit_parts,
-    split_where_struck,
-    target_of,
-    tightened,
-)
-from tcs.model.robots.measured_distances import measured_tables
-from tcs.model.robots.self_collision import blocked_at_boxes, blocked_by_shapes, renewed_groups
+from tcs_shapes.blocked import blocked_at_boxes, blocked_by_shapes
+from tcs_shapes.bodies import fit_robot, refit, refit_parts, target_of
+from tcs_shapes.bounding import enclose_axis
+from tcs_shapes.covering import Part, Target
+from tcs_shapes.disabled_pairs import renewed_groups
+from tcs_shapes.measured_distances import measured_tables
+from tcs_shapes.splitting import split_where_struck
+from tcs_shapes.tightening import Spots, tightened
 
 FITS = Path(__file__).parent / "fits.yaml"
 """Bodies of the shipped robots that are not fitted as usual."""

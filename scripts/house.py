@@ -73,7 +73,7 @@ def main() -> int:
     parser.add_argument("--below", default="", help="only files whose path starts so")
     options = parser.parse_args()
     files = [path for path in tracked() if str(path).startswith(options.below)]
-    for folder in ("tcs", "tests"):
+    for folder in ("tcs", "shapes", "studies", "tests"):
         sizes(folder, [path for path in files if path.parts[0] == folder])
     found = [hit for path in files for hit in private_words(path)]
     if options.words:

@@ -22,16 +22,16 @@ from tcs.motion import recheck
 
 HERE = Path(__file__).parent
 FIRST = (
-    "model/robots/fitting/test_enclosure.py",
+    "shapes/test_enclosure.py",
     "kernel/test_sweep.py",
-    "model/robots/fitting/test_fitting.py",
+    "shapes/test_fitting.py",
     "kernel/test_numeric_sweep.py",
-    "model/robots/fitting/test_splitting.py",
+    "shapes/test_splitting.py",
     "kernel/approach/test_approach.py",
     "kernel/test_together.py",
     "kernel/test_real_scene.py",
     "output/report/test_score_report.py",
-    "model/robots/self_collision/test_self_collision.py",
+    "shapes/test_self_collision.py",
     "placement/robustness/test_trials.py",
     "placement/refinement/test_surest.py",
     "cli/test_refine.py",

@@ -47,10 +47,15 @@ def of_extras() -> set[str]:
     return {MODULE_OF.get(name, name) for name in names - WITHOUT_MODULE}
 
 
+def modules() -> list[Path]:
+    """Modules of the packages that the wheel carries."""
+    return [*(CHECKOUT / "tcs").rglob("*.py"), *(CHECKOUT / "shapes").rglob("*.py")]
+
+
 def imported_modules() -> set[str]:
     """Top-level names of everything the package imports, lazily or not."""
     found = set()
-    for path in (CHECKOUT / "tcs").rglob("*.py"):
+    for path in modules():
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Import):
                 found |= {alias.name.split(".")[0] for alias in node.names}
@@ -60,7 +65,7 @@ def imported_modules() -> set[str]:
 
 
 def test_what_is_imported_is_what_is_depended_on():
-    foreign = imported_modules() - set(sys.stdlib_module_names) - {"tcs"}
+    foreign = imported_modules() - set(sys.stdlib_module_names) - {"tcs", "tcs_shapes"}
     modules = {MODULE_OF.get(name, name) for name in dependencies() - WITHOUT_MODULE}
     # These come with pydantic, numba and fastapi, in the versions those need.
     assert foreign - {"anyio", "llvmlite", "pydantic_core"} == modules | of_extras()
@@ -153,15 +158,13 @@ def test_wheel_carries_every_data_file_and_module(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
     assert data_files()
     assert {f"tcs/_data/{name}" for name in data_files()} <= names
-    modules = {str(path.relative_to(CHECKOUT)) for path in (CHECKOUT / "tcs").rglob("*.py")}
-    assert (
-        modules | {"tcs/py.typed", "tcs/output/report/page.css", "tcs/output/report/paper.yaml"}
-        <= names
-    )
+    carried = {str(path.relative_to(CHECKOUT)).removeprefix("shapes/") for path in modules()}
+    typed = {"tcs/py.typed", "tcs_shapes/py.typed"}
+    assert carried | typed | {"tcs/output/report/page.css", "tcs/output/report/paper.yaml"} <= names
 
 
 def test_wheel_carries_nothing_else(wheel):
-    allowed = re.compile(r"tcs/|tcs-[^/]*\.dist-info/")
+    allowed = re.compile(r"tcs/|tcs_shapes/|tcs-[^/]*\.dist-info/")
     names = zipfile.ZipFile(wheel).namelist()
     assert [name for name in names if not allowed.match(name) or "__pycache__" in name] == []
 
@@ -173,6 +176,7 @@ def test_wheel_works_away_from_the_checkout(wheel, tmp_path):
     code = (
         "from tcs.files.paths import data_folder\n"
         "from tcs.model.tasks import load_task, task_names\n"
+        "import tcs_shapes.draft\n"
         "print(data_folder()); print(*task_names()); print(len(load_task('shaving').goals))"
     )
     lines = run("-c", code, cwd=tmp_path, path=site).splitlines()
@@ -187,4 +191,5 @@ def test_source_archive_carries_what_make_and_the_licence_need(tmp_path):
     makefile = (CHECKOUT / "Makefile").read_text(encoding="utf-8")
     scripts = set(re.findall(r"\b(?:scripts|benchmarks)/\w+\.py", makefile))
     assert {"Makefile", "pyproject.toml", "requirements.lock", "tcs/__init__.py"} <= names
+    assert "shapes/tcs_shapes/__init__.py" in names
     assert {"LICENSE", "THIRD_PARTY.md", *scripts} <= names

@@ -94,7 +94,7 @@ class Descriptions:
         """Return the name under which `target` is described, or None when it is not."""
         if "." not in target:
             target = f"tcs.errors.{target}"
-        if target in objects or not target.startswith("tcs."):
+        if target in objects or not target.startswith(("tcs.", "tcs_")):
             return target if target in objects else None
         name = self._names.get(id(object_named(target)))
         if name is None:

@@ -23,13 +23,19 @@ from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
 from sphinx.errors import ExtensionError
 
-PACKAGE = Path(__file__).resolve().parents[2] / "tcs"
+CHECKOUT = Path(__file__).resolve().parents[2]
 FENCE = re.compile(r"^```\{package\} (tcs[.\w]*)\n```$", flags=re.M)
+
+
+def folder_of(package: str) -> Path:
+    """Return the folder of a package."""
+    top = CHECKOUT / "shapes" if package.startswith("tcs_shapes") else CHECKOUT
+    return top.joinpath(*package.split("."))
 
 
 def modules_below(package: str) -> list[str]:
     """Return the dotted names of a package's modules and packages; empty when it does not exist."""
-    folder = PACKAGE.joinpath(*package.split(".")[1:])
+    folder = folder_of(package)
     if not (folder / "__init__.py").is_file():
         return []
     names = [path.stem for path in folder.glob("*.py") if not path.stem.startswith("_")]
@@ -109,7 +115,7 @@ def write_out(app: Sphinx, document: str, source: list[str]) -> None:
 
     def written(fence: re.Match[str]) -> str:
         package = fence[1]
-        if not (PACKAGE.joinpath(*package.split(".")[1:]) / "__init__.py").is_file():
+        if not (folder_of(package) / "__init__.py").is_file():
             raise ExtensionError(f"{document}: there is no package {package}; rename the page")
         return "\n".join(sections(package, pages - {package}, set()))
 

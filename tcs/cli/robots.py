@@ -58,8 +58,7 @@ def new(
     as_json: options.Json = False,
 ) -> None:
     """Draft a robot file from any URDF, and a CSV file with its collision primitives."""
-    from tcs.model.robots.draft import DraftOptions
-    from tcs.model.robots.draft_files import draft_to_files
+    from tcs_shapes.draft import DraftOptions, draft_to_files
 
     path = out or Path(f"{Path(urdf).stem}.yaml")
     chosen = DraftOptions(
@@ -86,8 +85,8 @@ def check(
     as_json: options.Json = False,
 ) -> None:
     """Check a robot: arm class, limits, primitives, self-collision, IK; exit 1 if one fails."""
-    from tcs.model.checkup import check_up
     from tcs.model.robots import load_robot
+    from tcs_shapes.checkup import check_up
 
     found = check_up(load_robot(robot), samples=samples, seed=seed)
     terminal.print_result(found.to_json(), robot_tables.report_check, as_json=as_json)

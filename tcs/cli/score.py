@@ -171,7 +171,7 @@ def score(
         )
 
     from tcs.cli.values import person_values, settings
-    from tcs.model.checkup.quick import quick_problems
+    from tcs.model.robot_check import quick_problems
     from tcs.placement.scoring import default_path, files
     from tcs.placement.scoring.engines import engine_named
 

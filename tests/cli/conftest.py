@@ -64,7 +64,7 @@ def process() -> Callable[..., Ran]:
             text=True,
             check=False,
             cwd=cwd,
-            env={**os.environ, "PYTHONPATH": str(checkout)},
+            env={**os.environ, "PYTHONPATH": f"{checkout}{os.pathsep}{checkout / 'shapes'}"},
         )
         return Ran(done.returncode, done.stdout, done.stderr)
 

@@ -11,7 +11,7 @@ import tcs.capability.arplace
 from tcs.capability.arplace import save_arplace
 from tests.capability.arplace.example import discs, model
 
-HEAVY = ("pydrake", "numba", "scipy", "matplotlib", "pandas", "trimesh")
+HEAVY = ("pydrake", "numba", "scipy", "matplotlib", "pandas", "trimesh", "tcs_shapes")
 # Printed at exit on stderr, where these commands print nothing else.
 REPORT = (
     "import atexit; atexit.register(lambda: print("
@@ -40,6 +40,13 @@ def test_reading_a_robot_loads_nothing_that_only_fitting_needs(process):
     )
     assert ran.code == 0
     assert ran.err.strip() == "[]"
+
+
+def test_scoring_takes_no_shapes_until_a_mesh_is_to_be_fitted(process):
+    scoring = "import tcs.cli.robots, tcs.cli.score, tcs.model.scene, tcs.placement.scoring"
+    ran = process("--version", before=f"{REPORT}\n{scoring}")
+    assert "'pydrake'" in ran.err
+    assert "tcs_shapes" not in ran.err
 
 
 def test_a_query_of_arplace_needs_neither_simulator_nor_compiler(process, tmp_path):

@@ -10,9 +10,9 @@ from pydrake.systems.framework import Diagram
 
 from tcs.model import diagrams
 from tcs.model.robots import load_robot
-from tcs.model.robots.self_collision import SelfCollision
 from tcs.model.scene import EMPTY_ENVIRONMENT, SceneSpec, environment_shapes
 from tcs.model.scene.plant import build_plant
+from tcs_shapes.self_collision import SelfCollision
 
 
 @pytest.fixture

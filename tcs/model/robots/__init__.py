@@ -6,9 +6,8 @@ In: a robot file (YAML), the URDF and meshes that it names, and its primitives (
 
 from __future__ import annotations
 
-from tcs.model.robots.arms import BOTH, arm_references
 from tcs.model.robots.extras import robot_urdf
-from tcs.model.robots.hands import beside, links_of_arm, robot_of_hand
+from tcs.model.robots.hands import BOTH, arm_references, beside, links_of_arm, robot_of_hand
 from tcs.model.robots.held_tool import holding, load_robot, load_tool, tool_names
 from tcs.model.robots.loading import robot_names
 from tcs.model.robots.primitives import Primitive, read_primitives, union_volume, write_primitives

@@ -89,7 +89,7 @@ def _around(mesh: ToolMesh, folder: Path, where: str) -> list[BodyPrimitive]:
     # Imported where they are needed: they are slow to import, and few tools have a mesh.
     from scipy.spatial.transform import Rotation
 
-    from tcs.model.robots.fitting.mesh_shapes import shapes_around_mesh
+    from tcs.model.robots.mesh_shapes import shapes_around_mesh
 
     file = folder / expanded(mesh.file, f"{where}, field 'mesh.file'", RobotError)
     here = f"{where}, field 'mesh'"

@@ -17,7 +17,7 @@ from tcs.errors import RobotError
 from tcs.files.quantities import POSITION, PRIMITIVES, SIZE
 from tcs.files.reading import read_text
 from tcs.files.writing import whole_file
-from tcs.model.robots.cutting import halved, longest_edges
+from tcs.model.robots.triangles import halved, longest_edges
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

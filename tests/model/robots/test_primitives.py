@@ -5,8 +5,8 @@ import pytest
 
 from tcs.errors import RobotError
 from tcs.model.robots import Primitive, read_primitives, union_volume, write_primitives
-from tcs.model.robots.cutting import cut, longest_edges
 from tcs.model.robots.primitives import enclosed, quaternion_of_rpy, rotation_of
+from tcs.model.robots.triangles import cut, longest_edges
 
 IDENTITY = (1.0, 0.0, 0.0, 0.0)
 

@@ -13,11 +13,11 @@ import pytest
 from tcs.files.paths import data_folder
 from tcs.model.robots import load_robot, read_urdf
 from tcs.model.robots.extras import model_with_extras
-from tcs.model.robots.self_collision import SelfCollision, sample_positions
 from tcs.model.robots.urdf import Joint
 from tcs.model.robots.urdf.packages import resolve_uri
 from tcs.model.robots.urdf.pose import pose_in_root
 from tcs.model.robots.urdf.surfaces import body_triangles, geometry_triangles, place
+from tcs_shapes.self_collision import SelfCollision, sample_positions
 
 FOLDER = data_folder() / "models" / "robots"
 BAXTER = "package://example-robot-data/robots/baxter_description/urdf/baxter.urdf"

@@ -1,6 +1,6 @@
 """The suite for robots that ship: a new robot file in `models/robots` runs through every test.
 
-The IK round trip and the remaining checks of `check_up` are in tests/model/checkup/test_report.py,
+The IK round trip and the remaining checks of `check_up` are in tests/shapes/test_checkup.py,
 the proof that primitives enclose the meshes in fitting/test_enclosure.py, and a scored task in
 tests/placement/scoring/test_robots.py; all of them run over every robot as well.
 """
@@ -17,8 +17,8 @@ from pydrake.multibody.tree import RevoluteJoint
 
 from tcs.model.robots import load_robot, robot_names, robot_urdf
 from tcs.model.robots.extras import model_with_extras
-from tcs.model.robots.self_collision import SelfCollision, sample_positions
 from tcs.model.robots.urdf.pose import pose_in_root
+from tcs_shapes.self_collision import SelfCollision, sample_positions
 
 DOCS = Path(__file__).parents[3] / "docs" / "robots.md"
 LICENCE = re.compile(r"BSD|Apache-2\.0|MIT|CC BY")

@@ -6,18 +6,14 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from tcs.errors import EnvironmentFileError
-from tcs.model.robots.fitting.mesh_shapes import (
-    enclosed_volume,
-    own_mesh,
-    shapes_around_mesh,
-)
+from tcs.model.robots.mesh_shapes import enclosed_volume, own_mesh, shapes_around_mesh
 from tcs.model.robots.primitives import enclosed, union_volume
 from tcs.model.scene import environment_shapes, load_environment
 from tcs.model.scene.environment.check import check_environment
 from tcs.model.scene.environment.environment_file import Obstacle
 from tcs.model.scene.environment.obstacle_files import cloud_points
 from tcs.model.scene.environment.obstacle_shapes import obstacle_shapes
-from tcs.model.scene.environment.occupied_cells import boxes_of_cells
+from tcs_shapes.solids import boxes_of_cells
 
 GRID = """\
 grid:

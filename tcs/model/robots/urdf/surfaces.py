@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from tcs.errors import RobotError
 from tcs.files.unchanged import kept_while_unchanged
-from tcs.model.robots.cutting import distinct
+from tcs.model.robots.triangles import distinct
 from tcs.model.robots.urdf.meshes import mesh_triangles
 from tcs.model.robots.urdf.model import Geometry, Urdf, Vector
 

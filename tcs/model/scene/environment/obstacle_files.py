@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tcs.errors import EnvironmentFileError
 from tcs.files.reading import read_bytes
-from tcs.model.robots.fitting.mesh_shapes import check_positions
+from tcs.model.robots.mesh_shapes import check_positions
 from tcs.model.robots.urdf.meshes import MAX_BYTES
 
 FloatArray = NDArray[np.float64]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import EnvironmentFileError
-from tcs.model.robots.fitting.mesh_shapes import (
+from tcs.model.robots.mesh_shapes import (
     PROTRUSION,
     enclosed_volume,
     open_edges,
@@ -23,7 +23,6 @@ from tcs.model.robots.fitting.mesh_shapes import (
 from tcs.model.robots.primitives import Primitive
 from tcs.model.scene.environment.environment_file import Obstacle
 from tcs.model.scene.environment.obstacle_files import cloud_points
-from tcs.model.scene.environment.occupied_cells import boxes_of_cells
 
 FloatArray = NDArray[np.float64]
 
@@ -75,6 +74,9 @@ def obstacle_shapes(obstacle: Obstacle, where: str) -> tuple[Primitive, ...]:
                 f"{where}: '{file.name}' has no faces, so it is a point cloud, and 'protrusion' "
                 "is for meshes. Remove it."
             )
+        # Imported when there is a cloud: nothing else here needs it.
+        from tcs_shapes.solids import boxes_of_cells
+
         points = cloud_points(file, scale, where)
         cell = obstacle.cell or CELL
         return tuple(

@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from tcs.model.robots import kinematic_urdf, robot_urdf
 from tcs.model.robots.robot_file import ExtraFrame
-from tcs.model.robots.self_collision import sample_positions
 from tcs.model.robots.urdf.pose import pose_in_root
+from tcs_shapes.self_collision import sample_positions
 
 
 def parsed(text, robot):
