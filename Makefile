@@ -87,7 +87,7 @@ benchmark-save: $(STAMP)  ## Run every benchmark that a page shows, save and rew
 clean:  ## Remove everything the other targets made
 	rm -rf $(VENV) $(OUT) build dist
 	rm -rf .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
-	find tcs shapes tests scripts benchmarks examples docs -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true
+	find tcs shapes studies tests scripts benchmarks examples docs -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true
 
 lock: $(STAMP)  ## Renew requirements.lock: the newest versions that pyproject.toml allows
 	@$(BIN)/python -m pip install --disable-pip-version-check --quiet uv

@@ -22,7 +22,7 @@ from tcs.capability import (
     merge,
 )
 from tcs.model.robots import load_robot
-from tcs.teleop.simulated_recording import HandMotion, simulate_recording
+from tcs_studies.simulated_recording import HandMotion, simulate_recording
 
 
 def main() -> None:

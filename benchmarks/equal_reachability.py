@@ -15,11 +15,11 @@ from pathlib import Path
 from table import header, parser, record, row, save
 
 import tcs
-from tcs.output.report import load_paper
 from tcs.output.words import p_value
-from tcs.output.words.robustness import mean_and_std
 from tcs.placement.robustness import Trials, evaluate, rank_sum
 from tcs.placement.scoring import default_path
+from tcs_studies.output.report.robustness.paper import load_paper
+from tcs_studies.output.words import mean_and_std
 
 ROBOT = "pr2"
 COLUMNS = (

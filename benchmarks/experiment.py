@@ -14,17 +14,17 @@ import time
 from table import header, parser, record_table, row, save
 
 from tcs.model.robots import load_robot
-from tcs.output.report.teleop.tables import (
+from tcs.teleop.arm import load_arm, torso_height_of
+from tcs_studies.experiment.course import find_course
+from tcs_studies.experiment.within_subject import ExperimentPlan, run_experiment
+from tcs_studies.output.report.experiment.tables import (
     group_table,
     learning_table,
     motion_tables,
     signed_rank_table,
     trials_table,
 )
-from tcs.output.report.teleop.work import phase_table
-from tcs.teleop.arm import load_arm, torso_height_of
-from tcs.teleop.experiment.course import find_course
-from tcs.teleop.experiment.within_subject import ExperimentPlan, run_experiment
+from tcs_studies.output.report.experiment.work import phase_table
 
 
 def main() -> None:

@@ -206,7 +206,7 @@ def _write_scores(folder: Path) -> None:
 def _write_map(folder: Path) -> None:
     """Write a recording, and the map that is made of it."""
     from tcs.capability import MapGrid, map_from_recording, save_map, write_csv
-    from tcs.teleop.simulated_recording import HandMotion, simulate_recording
+    from tcs_studies.simulated_recording import HandMotion, simulate_recording
 
     reach = default_reach()
     recording = simulate_recording(reach, HandMotion(seconds=2.0), seed=0).recording

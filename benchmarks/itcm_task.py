@@ -41,7 +41,7 @@ from tcs.model.robots import load_robot
 from tcs.model.scene import EnvironmentFile
 from tcs.output.draw import save_figure
 from tcs.output.draw.capability_maps import task_figure
-from tcs.teleop.simulated_recording import HandMotion, simulate_recording
+from tcs_studies.simulated_recording import HandMotion, simulate_recording
 
 TORSO_HEIGHT = 0.1725
 """Torso height with the shoulder of TIAGo at 0.91 m."""

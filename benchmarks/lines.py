@@ -17,16 +17,16 @@ from table import cell, header, parser, record_table, row, save
 
 from tcs.model.robots import load_robot
 from tcs.output.report.blocks import Table
-from tcs.output.report.teleop.tables import maps_blocks, median_of
 from tcs.teleop.arm import load_arm, torso_height_of
-from tcs.teleop.experiment.course import find_course
-from tcs.teleop.experiment.maps import controller_maps
-from tcs.teleop.experiment.trial import END_EFFECTOR, NOVEL
-from tcs.teleop.experiment.within_subject import (
+from tcs_studies.experiment.course import find_course
+from tcs_studies.experiment.maps import controller_maps
+from tcs_studies.experiment.trial import END_EFFECTOR, NOVEL
+from tcs_studies.experiment.within_subject import (
     Experiment,
     ExperimentPlan,
     run_experiment,
 )
+from tcs_studies.output.report.experiment.tables import maps_blocks, median_of
 
 LINES = ("iiwa7/1", "iiwa7/2", "pr2/0", "tiago/0")
 TITLES = {"accuracy": "accuracy [mm]", "time": "time [s]", "effort": "effort [µJ]"}

@@ -38,12 +38,12 @@ from table import header, parser, record, row, save
 
 import tcs
 from tcs.kernel.arrays import FloatArray
-from tcs.output.report import load_paper
 from tcs.placement.refinement import refinement_summary
 from tcs.placement.refinement.floor import successes
 from tcs.placement.robustness import PerturbedPoints, Trials
 from tcs.placement.scoring import task_environment_pairs
 from tcs.placement.tables import tc_reachability
+from tcs_studies.output.report.robustness.paper import load_paper
 
 COLUMNS = (
     *("task, environment", "P_R + P_M of the grid", "refined", "gain", "of all sets"),

@@ -26,25 +26,25 @@ from tcs.capability import (
 )
 from tcs.capability.head import head_view
 from tcs.errors import TaskError
-from tcs.output.report.pick_and_place.tables import (
+from tcs.teleop.control.latency import Latency
+from tcs_studies.output.report.pick_and_place.tables import (
     segments_table,
     table_2,
 )
-from tcs.teleop.control.latency import Latency
-from tcs.teleop.pick_and_place.analysis import time_with_failures
-from tcs.teleop.pick_and_place.master import Coupling
-from tcs.teleop.pick_and_place.protocol import (
+from tcs_studies.pick_and_place.analysis import time_with_failures
+from tcs_studies.pick_and_place.master import Coupling
+from tcs_studies.pick_and_place.protocol import (
     PickAndPlace,
     Plan,
     Robot,
     load_pick_and_place_robot,
     run_pick_and_place,
 )
-from tcs.teleop.pick_and_place.repetition import Setting
-from tcs.teleop.pick_and_place.slave import Control
-from tcs.teleop.pick_and_place.task import CONDITIONS, EXPERT, ITCM_HIGH, ITCM_LOW, Condition
-from tcs.teleop.pick_and_place.traits import Traits
-from tcs.teleop.simulated_recording import HandMotion, simulate_recording
+from tcs_studies.pick_and_place.repetition import Setting
+from tcs_studies.pick_and_place.slave import Control
+from tcs_studies.pick_and_place.task import CONDITIONS, EXPERT, ITCM_HIGH, ITCM_LOW, Condition
+from tcs_studies.pick_and_place.traits import Traits
+from tcs_studies.simulated_recording import HandMotion, simulate_recording
 
 HEIGHT = 0.41
 """Height of the tool in the recording [m], as in the thesis."""

@@ -16,9 +16,9 @@ from pathlib import Path
 from table import header, parser, record, row, save
 
 import tcs
-from tcs.output.report import load_paper
-from tcs.output.words.robustness import mean_and_std
 from tcs.placement.robustness import Evaluation, evaluate
+from tcs_studies.output.report.robustness.paper import load_paper
+from tcs_studies.output.words import mean_and_std
 
 PRINTED = "head_rest <= 35 deg"
 COLUMNS = (

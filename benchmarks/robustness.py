@@ -20,10 +20,11 @@ from table import cell, header, parser, record, record_table, row, save
 
 import tcs
 from tcs.files.writing import make_folder
-from tcs.output.report import load_paper
 from tcs.output.report.blocks import Table
-from tcs.output.report.robustness.paper import Paper
-from tcs.output.report.robustness.tables import (
+from tcs.placement.robustness import robustify
+from tcs.placement.scoring import default_path
+from tcs_studies.output.report.robustness.paper import Paper, load_paper
+from tcs_studies.output.report.robustness.tables import (
     find_contrast,
     gain_table,
     is_short,
@@ -32,8 +33,7 @@ from tcs.output.report.robustness.tables import (
     table_1,
     table_3,
 )
-from tcs.placement.robustness import RowStudy, StudyPlan, check_row, robustify, study_rows
-from tcs.placement.scoring import default_path
+from tcs_studies.robustness.study import RowStudy, StudyPlan, check_row, study_rows
 
 ROBOT = "pr2"
 P_CLEAR = 0.01

@@ -17,9 +17,9 @@ from printed_grid import at_nominal_position
 from table import header, parser, record, row, save
 
 import tcs
-from tcs.output.report import load_paper
-from tcs.output.words.robustness import mean_and_std
 from tcs.placement.robustness import evaluate
+from tcs_studies.output.report.robustness.paper import load_paper
+from tcs_studies.output.words import mean_and_std
 
 BELOW = (
     "shaving/wheelchair",

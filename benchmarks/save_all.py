@@ -155,7 +155,13 @@ def run(name: str) -> float | None:
 def digest_of(name: str) -> str:
     """Return a digest of everything that the results of a part depend on."""
     digest = hashlib.sha256(json.dumps(PARTS[name]).encode())
-    folders = (CHECKOUT / "tcs", CHECKOUT / "shapes", CHECKOUT / "models", CHECKOUT / "tasks")
+    folders = (
+        CHECKOUT / "tcs",
+        CHECKOUT / "shapes",
+        CHECKOUT / "studies",
+        CHECKOUT / "models",
+        CHECKOUT / "tasks",
+    )
     files = [path for folder in folders for path in folder.rglob("*") if path.is_file()]
     for path in sorted([*files, CHECKOUT / "benchmarks" / f"{name}.py"]):
         if "__pycache__" not in path.parts:

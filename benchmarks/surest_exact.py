@@ -35,9 +35,9 @@ from table import header, parser, record, row, save
 
 import tcs
 from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
-from tcs.output.report import load_paper
 from tcs.placement.robustness import PerturbedPoints, Trials
 from tcs.placement.tables import Reason
+from tcs_studies.output.report.robustness.paper import load_paper
 
 COLUMNS = (
     *("task, environment: checks", "paper, Table I (standard deviation)"),

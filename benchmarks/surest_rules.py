@@ -41,13 +41,13 @@ from table import header, parser, record, row, save
 import tcs
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.model.random_streams import named_generator
-from tcs.output.report import load_paper
 from tcs.placement.refinement.points import PointScorer
 from tcs.placement.refinement.space import Space
 from tcs.placement.refinement.staged import StagedSamples
 from tcs.placement.refinement.surest import SurestSearch, surest_pairs, surest_triples
 from tcs.placement.robustness import PerturbedPoints, Trials
 from tcs.placement.tables import Reason
+from tcs_studies.output.report.robustness.paper import load_paper
 
 COLUMNS = (
     *("task, environment: rules", "paper, Table I (standard deviation)"),

@@ -13,7 +13,12 @@ import mcp  # noqa: F401
 HERE = Path(__file__).resolve().parent
 # The kernel's functions as plain Python: with signatures to read, and nothing to compile.
 os.environ["NUMBA_DISABLE_JIT"] = "1"
-sys.path[:0] = [str(HERE / "_ext"), str(HERE.parent), str(HERE.parent / "shapes")]
+sys.path[:0] = [
+    str(HERE / "_ext"),
+    str(HERE.parent),
+    str(HERE.parent / "shapes"),
+    str(HERE.parent / "studies"),
+]
 
 project = "tcs"
 author = "The tcs authors"

@@ -35,7 +35,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         examples = Path(shutil.copytree(CHECKOUT / "examples", Path(folder) / "examples"))
         where = run(
-            [python, "-c", "import tcs, tcs_shapes; print(tcs.__file__)"], cwd=examples
+            [python, "-c", "import tcs, tcs_shapes, tcs_studies; print(tcs.__file__)"], cwd=examples
         ).strip()
         if not Path(where).is_relative_to(out):
             print(f"tcs was imported from '{where}', not from the wheel.", file=sys.stderr)

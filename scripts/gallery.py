@@ -25,9 +25,9 @@ from tcs.output.report.score.pictures import map_figure, member_figure, scene_fi
 from tcs.output.report.score.shown_set import ShownSet
 from tcs.output.report.score.states import states_figure
 from tcs.output.words import member_text
-from tcs.placement.robustness import check_row
 from tcs.placement.scoring import default_path, task_environment_pairs
 from tcs.placement.store import ScoreFile
+from tcs_studies.robustness.study import check_row
 
 ROBOT = "pr2"
 HERE = tcs.InitialConfiguration(base_x=1.4, base_y=-1.2, base_yaw=math.pi, torso=0.0)

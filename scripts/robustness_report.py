@@ -19,9 +19,12 @@ from tcs.errors import UnknownNameError
 from tcs.files.writing import make_folder
 from tcs.model.random_streams import check_draws
 from tcs.output import terminal
-from tcs.output.report import draw_rows, load_paper, write_report
-from tcs.placement.robustness import StudyPlan, check_row, robustify, study_rows
+from tcs.placement.robustness import robustify
 from tcs.placement.scoring import default_path
+from tcs_studies.output.report.robustness.paper import load_paper
+from tcs_studies.output.report.robustness.row_pictures import draw_rows
+from tcs_studies.output.report.robustness.write import write_report
+from tcs_studies.robustness.study import StudyPlan, check_row, study_rows
 
 ROBOT = "pr2"
 SETS, SAMPLES = 200, 256

@@ -49,7 +49,7 @@ def of_extras() -> set[str]:
 
 def modules() -> list[Path]:
     """Modules of the packages that the wheel carries."""
-    return [*(CHECKOUT / "tcs").rglob("*.py"), *(CHECKOUT / "shapes").rglob("*.py")]
+    return [path for top in ("tcs", "shapes", "studies") for path in (CHECKOUT / top).rglob("*.py")]
 
 
 def imported_modules() -> set[str]:
@@ -65,7 +65,8 @@ def imported_modules() -> set[str]:
 
 
 def test_what_is_imported_is_what_is_depended_on():
-    foreign = imported_modules() - set(sys.stdlib_module_names) - {"tcs", "tcs_shapes"}
+    ours = {"tcs", "tcs_shapes", "tcs_studies"}
+    foreign = imported_modules() - set(sys.stdlib_module_names) - ours
     modules = {MODULE_OF.get(name, name) for name in dependencies() - WITHOUT_MODULE}
     # These come with pydantic, numba and fastapi, in the versions those need.
     assert foreign - {"anyio", "llvmlite", "pydantic_core"} == modules | of_extras()
@@ -158,13 +159,20 @@ def test_wheel_carries_every_data_file_and_module(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
     assert data_files()
     assert {f"tcs/_data/{name}" for name in data_files()} <= names
-    carried = {str(path.relative_to(CHECKOUT)).removeprefix("shapes/") for path in modules()}
-    typed = {"tcs/py.typed", "tcs_shapes/py.typed"}
-    assert carried | typed | {"tcs/output/report/page.css", "tcs/output/report/paper.yaml"} <= names
+    carried = {
+        re.sub("^(shapes|studies)/", "", str(path.relative_to(CHECKOUT))) for path in modules()
+    }
+    typed = {"tcs/py.typed", "tcs_shapes/py.typed", "tcs_studies/py.typed"}
+    data = {
+        "tcs/output/report/page.css",
+        "tcs_studies/output/report/robustness/paper.yaml",
+        "tcs_studies/output/study/form.css",
+    }
+    assert carried | typed | data <= names
 
 
 def test_wheel_carries_nothing_else(wheel):
-    allowed = re.compile(r"tcs/|tcs_shapes/|tcs-[^/]*\.dist-info/")
+    allowed = re.compile(r"tcs/|tcs_shapes/|tcs_studies/|tcs-[^/]*\.dist-info/")
     names = zipfile.ZipFile(wheel).namelist()
     assert [name for name in names if not allowed.match(name) or "__pycache__" in name] == []
 
@@ -176,7 +184,7 @@ def test_wheel_works_away_from_the_checkout(wheel, tmp_path):
     code = (
         "from tcs.files.paths import data_folder\n"
         "from tcs.model.tasks import load_task, task_names\n"
-        "import tcs_shapes.draft\n"
+        "import tcs_shapes.draft, tcs_studies.study.study_file\n"
         "print(data_folder()); print(*task_names()); print(len(load_task('shaving').goals))"
     )
     lines = run("-c", code, cwd=tmp_path, path=site).splitlines()
@@ -192,4 +200,5 @@ def test_source_archive_carries_what_make_and_the_licence_need(tmp_path):
     scripts = set(re.findall(r"\b(?:scripts|benchmarks)/\w+\.py", makefile))
     assert {"Makefile", "pyproject.toml", "requirements.lock", "tcs/__init__.py"} <= names
     assert "shapes/tcs_shapes/__init__.py" in names
+    assert "studies/tcs_studies/__init__.py" in names
     assert {"LICENSE", "THIRD_PARTY.md", *scripts} <= names

@@ -24,13 +24,15 @@ from sphinx.environment import BuildEnvironment
 from sphinx.errors import ExtensionError
 
 CHECKOUT = Path(__file__).resolve().parents[2]
+PLACES = {"tcs_shapes": "shapes", "tcs_studies": "studies"}
+"""Folders of the packages that are not at the top of the checkout."""
 FENCE = re.compile(r"^```\{package\} (tcs[.\w]*)\n```$", flags=re.M)
 
 
 def folder_of(package: str) -> Path:
     """Return the folder of a package."""
-    top = CHECKOUT / "shapes" if package.startswith("tcs_shapes") else CHECKOUT
-    return top.joinpath(*package.split("."))
+    top, *parts = package.split(".")
+    return CHECKOUT.joinpath(PLACES.get(top, ""), top, *parts)
 
 
 def modules_below(package: str) -> list[str]:

@@ -15,7 +15,7 @@ from tcs.cli.teleop.groups import TorsoHeight
 from tcs.output import terminal
 
 if TYPE_CHECKING:
-    from tcs.output.study.session import StudySession
+    from tcs_studies.output.study.session import StudySession
 
 app = typer.Typer(help="Trials and questionnaires of people: plan, record, report.")
 Folder = Annotated[
@@ -69,7 +69,7 @@ def new(
     line_seed: Annotated[int, typer.Option(min=0, help="Seed of the search for the line.")] = 0,
 ) -> None:
     """Make the folder of a study: its plan, with the line that all participants follow."""
-    from tcs.teleop.study.creating import new_study
+    from tcs_studies.study.creating import new_study
 
     study = new_study(
         folder,
@@ -124,7 +124,7 @@ def record(
     """Record the next trials and questionnaires of a participant, and resume after a break."""
     if skip is not None and drop is not None:
         raise typer.BadParameter("excludes --skip.", param_hint="--drop")
-    from tcs.output.study.session import Given, open_session
+    from tcs_studies.output.study.session import Given, open_session
 
     given = Given(runs=tuple(run or ()), answers=answers)
     with open_session(folder, participant, new=new, given=given, report=typer.echo) as session:
@@ -138,7 +138,7 @@ def record(
 
 def _walk(session: StudySession, window: options.WindowOptions) -> None:
     """Record step by step until nothing is left that can be recorded here."""
-    from tcs.output.study.session import Screen
+    from tcs_studies.output.study.session import Screen
 
     def show(url: str) -> None:
         terminal.note(f"open {url} in a browser; Ctrl-C ends, and every finished step is saved.")
@@ -160,9 +160,9 @@ def report(
     as_json: options.Json = False,
 ) -> None:
     """Compare the conditions: the papers' tables and pictures, with every table as CSV."""
-    from tcs.output.report.study.files import write_study_report
-    from tcs.output.terminal import study_tables
-    from tcs.teleop.study.study_file import load_study
+    from tcs_studies.output import study_tables
+    from tcs_studies.output.report.study.files import write_study_report
+    from tcs_studies.study.study_file import load_study
 
     study = load_study(folder)
     with terminal.progress_bar("participants") as on_progress:

@@ -2,8 +2,8 @@
 
 In: an arm from a robot file (`load_arm`) and one `Command` per control period. Out: one `Step` per
 period (joints, tool pose, limits, singularity, reason for a stop), recorded as runs. Subpackages:
-`control` (the control law), `operators` (scripted operators), `runs` (recorded steps and their
-files) and `experiment` (trials, metrics and statistics of the null-space paper).
+`control` (the control law) and `runs` (recorded steps and their files). Scripted operators and the
+experiments of the papers are in `tcs_studies`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A straight line for the tool to follow."""
+"""A straight line for the tool to follow, and the posture of the arm at its start."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ import numpy as np
 
 from tcs.errors import DataFileError
 from tcs.kernel.arrays import FloatArray
+
+GOAL_RADIUS = 0.02
+"""Radius of the sphere at the end of the line [m]; the paper shows one without its size."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,3 +51,21 @@ class Line:
     def fraction_at(self, position: FloatArray) -> FloatArray:
         """Return the fraction of the line at the projection of a point, shape (...)."""
         return np.asarray((position - np.asarray(self.start)) @ self.direction / self.length)
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A line, and the posture of the arm at its start."""
+
+    line: Line
+    """The line in the robot's base [m]."""
+    joints: FloatArray
+    """Start posture [rad], shape (7,)."""
+    blocking: int
+    """The joint that blocks the line, counted from 0."""
+    turns: tuple[float, ...]
+    """Rotations of joint 1 that unblock the line [rad]."""
+
+    def __post_init__(self) -> None:
+        """Make the array read-only."""
+        self.joints.flags.writeable = False

@@ -58,13 +58,14 @@ def process() -> Callable[..., Ran]:
     def run(*words: object, before: str = "", cwd: Path | None = None) -> Ran:
         code = f"import sys\n{before}\nfrom tcs.cli import main\nmain()"
         checkout = Path(__file__).resolve().parents[2]
+        folders = checkout, checkout / "shapes", checkout / "studies"
         done = subprocess.run(
             [sys.executable, "-c", code, *map(str, words)],
             capture_output=True,
             text=True,
             check=False,
             cwd=cwd,
-            env={**os.environ, "PYTHONPATH": f"{checkout}{os.pathsep}{checkout / 'shapes'}"},
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, folders))},
         )
         return Ran(done.returncode, done.stdout, done.stderr)
 

@@ -12,13 +12,13 @@ from pathlib import Path
 import pytest
 import yaml
 
-from tcs.output.terminal.study_tables import report_study
 from tcs.teleop.runs.files import save_run
-from tcs.teleop.study.participants import load_participant, new_participant, participant_names
-from tcs.teleop.study.recording import StudyRecording
-from tcs.teleop.study.steps import form_of, steps_of
-from tcs.teleop.study.study_file import load_study
-from tests.teleop.study.example import answers_to, complete, run_on, small_study
+from tcs_studies.output.study_tables import report_study
+from tcs_studies.study.participants import load_participant, new_participant, participant_names
+from tcs_studies.study.recording import StudyRecording
+from tcs_studies.study.steps import form_of, steps_of
+from tcs_studies.study.study_file import load_study
+from tests.studies.study.example import answers_to, complete, run_on, small_study
 
 
 @pytest.fixture

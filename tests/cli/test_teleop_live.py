@@ -16,13 +16,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tcs.output.terminal.teleop_tables import line_text
 from tcs.teleop import Command, Teleoperation, load_arm
-from tcs.teleop.experiment.course import find_course
-from tcs.teleop.experiment.trial import line_result
 from tcs.teleop.line import Line
 from tcs.teleop.runs.files import load_run, save_run
 from tcs.teleop.runs.recorder import run_from_steps
+from tcs_studies.experiment.course import find_course
+from tcs_studies.experiment.trial import line_result
+from tcs_studies.output.teleop_tables import line_text
 
 READY_DEG = (0, 34, 0, -80, 0, 57, 0)
 

@@ -86,8 +86,12 @@ def test_every_promised_name_leads_to_its_description(site):
 
 def modules() -> list[str]:
     """Return the modules and packages whose description belongs in the API."""
-    tops = (CHECKOUT, "tcs"), (CHECKOUT / "shapes", "tcs_shapes")
-    paths = [path.relative_to(top) for top, name in tops for path in (top / name).rglob("*.py")]
+    tops = {"tcs": "", "tcs_shapes": "shapes", "tcs_studies": "studies"}
+    paths = [
+        path.relative_to(CHECKOUT / top)
+        for name, top in tops.items()
+        for path in (CHECKOUT / top / name).rglob("*.py")
+    ]
     names = [path.parent if path.stem == "__init__" else path.with_suffix("") for path in paths]
     return sorted(".".join(name.parts) for name in names if name.parts[1:2] not in WITHOUT_PAGE)
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from tcs.teleop import load_arm
-from tcs.teleop.experiment.course import find_course
 
 
 @pytest.fixture(scope="session")
@@ -19,9 +18,3 @@ def iiwa():
 def ready():
     """A posture of the iiwa in the middle of its workspace, elbow up [rad]."""
     return np.array([0.0, 0.6, 0.0, -1.4, 0.0, 1.0, 0.0])
-
-
-@pytest.fixture(scope="session")
-def course(iiwa):
-    """The line of the experiment with the iiwa; finding it takes seconds."""
-    return find_course(iiwa)

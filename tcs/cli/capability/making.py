@@ -115,7 +115,7 @@ def record(
         recording = read_csv(csv, reach.robot, drop_bad=samples.drop_bad)
         _map_recording(reach, recording, files, scores, grid, samples, {}, as_json=as_json)
         return
-    from tcs.teleop.simulated_recording import HandMotion, simulate_recording
+    from tcs_studies.simulated_recording import HandMotion, simulate_recording
 
     height = 0.41 if samples.height is None else samples.height
     motion = HandMotion(height=height, seconds=seconds, scale=scale, centre=centre)

@@ -13,7 +13,6 @@ from tcs.cli import options
 from tcs.cli.option_groups import expand_options
 from tcs.cli.teleop.groups import LatencyOptions, TorsoHeight, open_page
 from tcs.output import terminal
-from tcs.output.terminal import teleop_tables
 
 _KEYS = (
     "W/S forward, A/D sideways, R/F up and down, U/O roll, I/K pitch, J/L yaw; M next mode, "
@@ -109,19 +108,25 @@ def live(
 
     from tcs.files.writing import check_writable
     from tcs.output.view.teleop.session import LiveOptions, LiveSession
-    from tcs.teleop.experiment.trial import line_result
     from tcs.teleop.runs.files import check_format, save_run
 
     if save is not None:
         check_format(save)
         check_writable(save)
+    course = None
     if line:
+        from tcs.model.robots import load_robot
+        from tcs.teleop.arm import load_arm, torso_height_of
+        from tcs_studies.experiment.course import find_course
+
         terminal.note("searching for a line that requires null-space motion, some seconds.")
+        file = load_robot(robot)
+        course = find_course(load_arm(file, torso_height=torso_height_of(file, torso_height)))
     latency = delay.value()
     session = LiveSession(
         LiveOptions(
             robot=robot, behaviour=behaviour.value, condition=condition.value,
-            start_deg=start_deg, torso_height=torso_height, line=line,
+            start_deg=start_deg, torso_height=torso_height, course=course,
             latency=latency, cameras=cameras, xr=xr,
         ),
         port=window.port, on_stop=typer.echo, record=save is not None,
@@ -144,6 +149,9 @@ def live(
         elif save is not None and run is not None:
             save_run(save, run)
             typer.echo(f"wrote {save}: {len(run)} samples, {run.time[-1] - run.time[0]:.1f} s")
-    if session.course is not None and run is not None:
-        typer.echo(teleop_tables.line_text(line_result(run, session.course.line)))
+    if course is not None and run is not None:
+        from tcs_studies.experiment.trial import line_result
+        from tcs_studies.output.teleop_tables import line_text
+
+        typer.echo(line_text(line_result(run, course.line)))
     terminal.note(session.page.timing())

@@ -13,7 +13,6 @@ from tcs.cli import options
 from tcs.cli.teleop.groups import LatencyOf
 from tcs.files.quantities import LATENCY
 from tcs.output import terminal
-from tcs.output.terminal import teleop_tables
 
 
 class SlaveControl(StrEnum):
@@ -94,12 +93,13 @@ def pick_and_place(
     as_json: options.Json = False,
 ) -> None:
     """Pick and place a cup from three base poses of TIAGo: the experiment of the ITCM thesis."""
-    from tcs.output.report.pick_and_place.files import write_pick_and_place
     from tcs.teleop.control.latency import Latency
-    from tcs.teleop.pick_and_place.master import Coupling
-    from tcs.teleop.pick_and_place.protocol import Plan
-    from tcs.teleop.pick_and_place.slave import Control
-    from tcs.teleop.pick_and_place.task import Condition, conditions_named
+    from tcs_studies.output.report.pick_and_place.files import write_pick_and_place
+    from tcs_studies.output.teleop_tables import report_pick_and_place
+    from tcs_studies.pick_and_place.master import Coupling
+    from tcs_studies.pick_and_place.protocol import Plan
+    from tcs_studies.pick_and_place.slave import Control
+    from tcs_studies.pick_and_place.task import Condition, conditions_named
 
     given = () if base is None else (Condition("given", *base),)
     plan = Plan(
@@ -119,4 +119,4 @@ def pick_and_place(
         result = write_pick_and_place(
             plan, out, command=shlex.join(words), jobs=jobs, on_progress=on_progress
         )
-    terminal.print_result(result, teleop_tables.report_pick_and_place, as_json=as_json)
+    terminal.print_result(result, report_pick_and_place, as_json=as_json)

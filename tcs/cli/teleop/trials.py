@@ -12,7 +12,6 @@ from tcs.cli import options
 from tcs.cli.option_groups import expand_options
 from tcs.cli.teleop.groups import LatencyOptions, TorsoHeight
 from tcs.output import terminal
-from tcs.output.terminal import teleop_tables
 
 
 @expand_options
@@ -58,9 +57,14 @@ def experiment(
     """Compare controllers: scripted operators follow a line that requires null-space motion."""
     from tcs.files.writing import check_writable
     from tcs.model.robots import load_robot
-    from tcs.output.report.teleop.files import FILES, make_experiment_folder, write_experiment
     from tcs.teleop.arm import load_arm, torso_height_of
-    from tcs.teleop.experiment.within_subject import ExperimentPlan
+    from tcs_studies.experiment.within_subject import ExperimentPlan
+    from tcs_studies.output.report.experiment.files import (
+        FILES,
+        make_experiment_folder,
+        write_experiment,
+    )
+    from tcs_studies.output.teleop_tables import report_experiment
 
     words = ["tcs", "teleop", "experiment", "--robot", robot, "--operators", str(operators)]
     words += ["--trials", str(trials), "--training", str(training), "--seed", str(seed)]
@@ -85,4 +89,4 @@ def experiment(
             arm, plan, folder, line_seed=line_seed, runs_as=suffix, maps=maps,
             command=shlex.join(words), jobs=jobs, on_progress=on_progress,
         )  # fmt: skip
-    terminal.print_result(result, teleop_tables.report_experiment, as_json=as_json)
+    terminal.print_result(result, report_experiment, as_json=as_json)

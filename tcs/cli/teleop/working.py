@@ -9,7 +9,6 @@ import typer
 
 from tcs.cli import options
 from tcs.output import terminal
-from tcs.output.terminal import teleop_tables
 
 
 def work(
@@ -26,16 +25,17 @@ def work(
     as_json: options.Json = False,
 ) -> None:
     """Print the work on the device in a run along the line, before, in and after the solution."""
-    from tcs.teleop.experiment.phases import attempt_work
-    from tcs.teleop.experiment.trial import GOAL_RADIUS
+    from tcs.teleop.line import GOAL_RADIUS
     from tcs.teleop.runs.files import load_run
+    from tcs_studies.experiment.phases import attempt_work
+    from tcs_studies.output.teleop_tables import report_work
 
     found = attempt_work(load_run(run), GOAL_RADIUS)
     result = {"file": str(run), **found.to_json(), "picture": picture and str(picture)}
     if picture is not None:
         from tcs.output.draw import save_figure
-        from tcs.output.draw.work import WorkCurve, draw_work_over_time
+        from tcs_studies.output.draw.work import WorkCurve, draw_work_over_time
 
         curve = WorkCurve(run.name, found.time, found.work, found.solution)
         save_figure(picture, draw_work_over_time([curve]))
-    terminal.print_result(result, teleop_tables.report_work, as_json=as_json)
+    terminal.print_result(result, report_work, as_json=as_json)

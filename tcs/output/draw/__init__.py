@@ -6,7 +6,6 @@ without a display.
 
 from __future__ import annotations
 
-from tcs.output.draw.boxes import BoxGroup, BoxPlot, draw_boxes
 from tcs.output.draw.encoded import as_png, as_svg
 from tcs.output.draw.files import FORMATS, check_format, save_figure
 from tcs.output.draw.floor_plan import BaseFootprint
@@ -14,7 +13,6 @@ from tcs.output.draw.goal_marks import GoalMark
 from tcs.output.draw.map import draw_map
 from tcs.output.draw.picture import ScenePanel, draw_scene
 from tcs.output.draw.population import population_figure
-from tcs.output.draw.scatter import Cloud, draw_clouds
 from tcs.output.draw.solids import Category, Solid, primitive_corners
 from tcs.output.draw.states import StatePanel, draw_states
 from tcs.placement.tables.place_map import PlaceMap
@@ -22,10 +20,7 @@ from tcs.placement.tables.place_map import PlaceMap
 __all__ = [
     "FORMATS",
     "BaseFootprint",
-    "BoxGroup",
-    "BoxPlot",
     "Category",
-    "Cloud",
     "GoalMark",
     "PlaceMap",
     "ScenePanel",
@@ -34,8 +29,6 @@ __all__ = [
     "as_png",
     "as_svg",
     "check_format",
-    "draw_boxes",
-    "draw_clouds",
     "draw_map",
     "draw_scene",
     "draw_states",

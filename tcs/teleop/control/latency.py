@@ -62,6 +62,10 @@ class Latency:
         return {"command_latency": self.command, "picture_latency": self.picture}
 
 
+NO_LATENCY = Latency()
+"""The latency where none is given."""
+
+
 class DelayLine(Generic[T]):
     """A line of values of which each comes out a fixed number of periods after it went in."""
 

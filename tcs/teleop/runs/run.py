@@ -15,6 +15,8 @@ from tcs.teleop.control.settings import Mode
 from tcs.teleop.line import Line
 
 IntArray = NDArray[np.int64]
+SCRIPTED_TYPE = "scripted"
+"""Metadata `operator_type` of a run with a scripted operator."""
 NO_GROUP = -1
 """Value of `Run.group` where no joint group was commanded."""
 _UNIT_SLACK = 1e-6

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from tcs.output.report import load_paper
 from tcs.placement.store import save_scores
+from tcs_studies.output.report.robustness.paper import load_paper
 from tests.placement.store.example import score_file
 
 CHECKOUT = Path(__file__).resolve().parents[3]

@@ -55,6 +55,12 @@ def read(page):
     return reader
 
 
+def column(table, title):
+    """The texts of one column."""
+    titles = [column.title for column in table.columns]
+    return [row[titles.index(title)] for row in table.texts()]
+
+
 def page_of(*blocks):
     return Page("A title", "The lead.", [Section("One: first", blocks), Section("Two", [])], "foot")
 

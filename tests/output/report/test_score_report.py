@@ -26,8 +26,7 @@ from tcs.placement.scoring import score
 from tcs.placement.store import StateTables, load_scores, save_scores
 from tcs.placement.tables import Reason
 from tests.environments import write_environment
-from tests.output.report.test_page import Reader
-from tests.output.report.test_robustness_report import column
+from tests.output.report.test_page import Reader, column
 
 FAR = {
     "base_x": (5, 0.1, 3),

@@ -10,8 +10,7 @@ import pytest
 import tcs
 from tcs.errors import SelectionError, TcsError, UnknownNameError
 from tcs.model.scene import ErrorDistribution
-from tcs.placement.robustness import Trials, compare_methods, evaluate, mean_of
-from tcs.placement.robustness.comparison import METHODS
+from tcs.placement.robustness import Trials, evaluate, mean_of
 from tcs.placement.tables import tc_reachability
 
 NOTHING = {"person_x": ErrorDistribution(distribution="normal", std=0.0)}
@@ -137,17 +136,6 @@ def test_equal_sets_have_the_greatest_reachability(bed_trials, members):
         assert found.choices == np.count_nonzero(np.abs(of_single - greatest) < 1e-9)
     loose = evaluate(bed_trials, samples=40, select="uniform", members=members)
     assert 0 < found.choices <= loose.choices
-
-
-def test_one_and_two_with_and_without(bed_trials):
-    table = compare_methods(bed_trials, samples=60)
-    assert tuple(table.paired) == METHODS
-    assert len(table.contrasts) == 4
-    for contrast in table.contrasts:
-        first, second = table.paired[contrast.first], table.paired[contrast.second]
-        assert contrast.paired.mean == pytest.approx(first.summary.mean - second.summary.mean)
-        assert contrast.independent.mean != contrast.paired.mean
-    assert json.dumps(table.to_json())
 
 
 @pytest.mark.parametrize(

@@ -24,9 +24,9 @@ from tcs.output.view.teleop.panel import (
 from tcs.output.view.teleop.robot_display import TOOL, RobotDisplay, draw_course, draw_path, pose_of
 from tcs.teleop import Arm, Mode, Settings, load_arm
 from tcs.teleop.arm import torso_height_of
-from tcs.teleop.experiment.trial import GOAL_RADIUS, SCRIPTED_TYPE
+from tcs.teleop.line import GOAL_RADIUS
 from tcs.teleop.runs.files import load_run
-from tcs.teleop.runs.run import NO_GROUP, Run
+from tcs.teleop.runs.run import NO_GROUP, SCRIPTED_TYPE, Run
 
 FloatArray = NDArray[np.float64]
 TIME, SPEED = "time [s]", "speed"

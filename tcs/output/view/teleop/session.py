@@ -24,10 +24,9 @@ from tcs.output.view.teleop.set_point import joint_sliders
 from tcs.output.view.teleop.start import start_posture
 from tcs.teleop import Arm, Command, Mode, Settings, Step, load_arm
 from tcs.teleop.arm import torso_height_of
-from tcs.teleop.control.latency import Latency
+from tcs.teleop.control.latency import NO_LATENCY, Latency
 from tcs.teleop.control.settings import LimitBehaviour
-from tcs.teleop.experiment.course import Course, find_course
-from tcs.teleop.experiment.trial import GOAL_RADIUS, NO_LATENCY
+from tcs.teleop.line import GOAL_RADIUS, Course
 from tcs.teleop.runs.recorder import Recorder
 from tcs.teleop.runs.run import Run
 
@@ -52,8 +51,7 @@ class LiveOptions:
         condition: Key of `CONDITION_MODES`.
         start_deg: Start posture [deg], seven numbers; None to search for one.
         torso_height: Height of the torso joint [m]; None for the middle of its range.
-        line: Whether to search for the experiment's line, show it and start there.
-        course: The line to show and its start posture; None to search for one if `line`.
+        course: A line to show and its start posture; None for none.
         latency: Latency between the operator and the arm.
         cameras: Whether the page shows pictures of the head and wrist cameras.
         xr: Whether an XR controller can move the tool.
@@ -64,7 +62,6 @@ class LiveOptions:
     condition: LiveCondition = "novel"
     start_deg: tuple[float, ...] | None = None
     torso_height: float | None = None
-    line: bool = False
     course: Course | None = None
     latency: Latency = NO_LATENCY
     cameras: bool = False
@@ -105,8 +102,8 @@ class LiveSession:
 
         Raises:
             OutputError: If the port cannot be used.
-            TcsError: If the robot cannot be used, the start posture is out of the joint limits, or
-                no line is found.
+            TcsError: If the robot cannot be used, the start posture is out of the joint
+                limits.
         """
         self._options = options
         robot = load_robot(options.robot)
@@ -115,8 +112,6 @@ class LiveSession:
         meshcat = self._meshcat = open_meshcat(hidden=True)
         display = RobotDisplay(self.arm, meshes=True)
         self.course = options.course
-        if self.course is None and options.line:
-            self.course = find_course(self.arm)
         if self.course is not None:
             start = self.course.joints
         if start is None:

@@ -1,0 +1,1 @@
+"""Presentation of the studies: words, tables for the terminal, pictures, pages and forms."""

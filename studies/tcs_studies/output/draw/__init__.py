@@ -1,0 +1,1 @@
+"""Pictures of the studies: boxes, paths, answers and work."""
