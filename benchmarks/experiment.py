@@ -17,6 +17,7 @@ from tcs.model.robots import load_robot
 from tcs.teleop.arm import load_arm, torso_height_of
 from tcs_studies.experiment.course import find_course
 from tcs_studies.experiment.within_subject import ExperimentPlan, run_experiment
+from tcs_studies.output.report.experiment.pictures import phase_table
 from tcs_studies.output.report.experiment.tables import (
     group_table,
     learning_table,
@@ -24,7 +25,6 @@ from tcs_studies.output.report.experiment.tables import (
     signed_rank_table,
     trials_table,
 )
-from tcs_studies.output.report.experiment.work import phase_table
 
 
 def main() -> None:

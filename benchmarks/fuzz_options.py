@@ -288,7 +288,7 @@ def make_bag(folder: Path) -> None:
 
 def make_study(folder: Path) -> None:
     """Write the plan of a study, which `make_odd_files` puts in a folder of its own."""
-    from tcs_studies.study.creating import new_study
+    from tcs_studies.study.study_file import new_study
 
     plan = {
         **{"title": "Study", "robot": "iiwa7", "torso_height": None, "training": 0, "trials": 1},

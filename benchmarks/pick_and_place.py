@@ -33,6 +33,7 @@ from tcs_studies.output.report.pick_and_place.tables import (
 )
 from tcs_studies.pick_and_place.analysis import time_with_failures
 from tcs_studies.pick_and_place.master import Coupling
+from tcs_studies.pick_and_place.phases import Traits
 from tcs_studies.pick_and_place.protocol import (
     PickAndPlace,
     Plan,
@@ -43,7 +44,6 @@ from tcs_studies.pick_and_place.protocol import (
 from tcs_studies.pick_and_place.repetition import Setting
 from tcs_studies.pick_and_place.slave import Control
 from tcs_studies.pick_and_place.task import CONDITIONS, EXPERT, ITCM_HIGH, ITCM_LOW, Condition
-from tcs_studies.pick_and_place.traits import Traits
 from tcs_studies.simulated_recording import HandMotion, simulate_recording
 
 HEIGHT = 0.41

@@ -21,8 +21,8 @@ from tcs.model.random_streams import check_draws
 from tcs.output import terminal
 from tcs.placement.robustness import robustify
 from tcs.placement.scoring import default_path
+from tcs_studies.output.report.robustness.page import draw_rows
 from tcs_studies.output.report.robustness.paper import load_paper
-from tcs_studies.output.report.robustness.row_pictures import draw_rows
 from tcs_studies.output.report.robustness.write import write_report
 from tcs_studies.robustness.study import StudyPlan, check_row, study_rows
 

@@ -69,7 +69,7 @@ def new(
     line_seed: Annotated[int, typer.Option(min=0, help="Seed of the search for the line.")] = 0,
 ) -> None:
     """Make the folder of a study: its plan, with the line that all participants follow."""
-    from tcs_studies.study.creating import new_study
+    from tcs_studies.study.study_file import new_study
 
     study = new_study(
         folder,
@@ -160,11 +160,11 @@ def report(
     as_json: options.Json = False,
 ) -> None:
     """Compare the conditions: the papers' tables and pictures, with every table as CSV."""
-    from tcs_studies.output import study_tables
     from tcs_studies.output.report.study.files import write_study_report
+    from tcs_studies.output.terminal_tables import report_study
     from tcs_studies.study.study_file import load_study
 
     study = load_study(folder)
     with terminal.progress_bar("participants") as on_progress:
         result = write_study_report(study, out, on_progress=on_progress)
-    terminal.print_result(result, study_tables.report_study, as_json=as_json)
+    terminal.print_result(result, report_study, as_json=as_json)

@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from tcs.teleop.runs.files import save_run
-from tcs_studies.output.study_tables import report_study
+from tcs_studies.output.terminal_tables import report_study
 from tcs_studies.study.participants import load_participant, new_participant, participant_names
 from tcs_studies.study.recording import StudyRecording
 from tcs_studies.study.steps import form_of, steps_of

@@ -22,7 +22,7 @@ from tcs.teleop.runs.files import load_run, save_run
 from tcs.teleop.runs.recorder import run_from_steps
 from tcs_studies.experiment.course import find_course
 from tcs_studies.experiment.trial import line_result
-from tcs_studies.output.teleop_tables import line_text
+from tcs_studies.output.terminal_tables import line_text
 
 READY_DEG = (0, 34, 0, -80, 0, 57, 0)
 

@@ -28,7 +28,7 @@ from tcs_studies.experiment.metrics import (
     trajectory_accuracy,
 )
 from tcs_studies.experiment.phases import work_over_time
-from tcs_studies.operators.scripted import Experience, OperatorTraits, Recovery, ScriptedOperator
+from tcs_studies.operators import Experience, OperatorTraits, Recovery, ScriptedOperator
 
 TIME_LIMIT = 120.0
 """Time limit of a trial [s] (paper, experiment information, part 3)."""

@@ -38,7 +38,7 @@ from tcs_studies.experiment.trial import (
     run_trial,
     sampled_path,
 )
-from tcs_studies.operators.scripted import Experience, OperatorTraits
+from tcs_studies.operators import Experience, OperatorTraits
 
 OPERATORS = 26
 """Number of participants in the paper."""

@@ -17,13 +17,15 @@ from tcs.model.robots import load_robot
 from tcs.teleop.arm import Arm, load_arm
 from tcs_studies.experiment.order import counterbalanced_orders
 from tcs_studies.pick_and_place.master import Coupling
-from tcs_studies.pick_and_place.measures import Measures, measure
 from tcs_studies.pick_and_place.operator import Experience
+from tcs_studies.pick_and_place.phases import Traits
 from tcs_studies.pick_and_place.repetition import (
     TIME_LIMIT,
+    Measures,
     Outcome,
     Repetition,
     Setting,
+    measure,
     perform,
 )
 from tcs_studies.pick_and_place.slave import Control
@@ -34,7 +36,6 @@ from tcs_studies.pick_and_place.task import (
     TORSO_HEIGHT,
     Condition,
 )
-from tcs_studies.pick_and_place.traits import Traits
 from tcs_studies.pick_and_place.view import aimed_at
 
 OPERATORS, REPETITIONS = 6, 7

@@ -8,6 +8,7 @@ from pathlib import Path
 from threading import Lock
 
 from tcs.errors import DataFileError
+from tcs.files.documents import read_mapping
 from tcs.files.reading import read_bytes
 from tcs.files.writing import make_folder, whole_file
 from tcs.teleop.runs.files import MAX_BYTES, load_run, save_run
@@ -212,3 +213,34 @@ class StudyRecording:
         changed = with_record(self._participant, step.key, record)
         save_participant(self.study, changed)
         self._participant = changed
+
+
+def load_answers(recording: StudyRecording, path: Path) -> dict[str, dict[str, object]]:
+    """Return the answers of a participant's forms in a YAML or JSON file.
+
+    The file maps the key of each form, such as `novel/van-der-laan`, to its answers by question.
+
+    Args:
+        recording: The session of the participant.
+        path: The file.
+
+    Returns:
+        Answers by key of the form, valid for the forms of the participant.
+
+    Raises:
+        DataFileError: If the file cannot be read, or a form or an answer in it is invalid.
+    """
+    where = f"answers '{path}'"
+    order = recording.participant.order
+    forms = {one.key: one for one in steps_of(recording.study, order) if one.form is not None}
+    content = read_mapping(path, where, DataFileError, known=forms)
+    for key, answers in content.items():
+        if key not in forms:
+            raise DataFileError(
+                f"{where}: '{key}' is not a questionnaire of "
+                f"'{recording.participant.participant}'. These are: {', '.join(forms)}."
+            )
+        if not isinstance(answers, dict):
+            raise DataFileError(f"{where}, '{key}': must map questions to answers.")
+        recording.form(forms[key]).checked(answers, f"{where}, '{key}'")
+    return content

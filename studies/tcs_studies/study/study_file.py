@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 import yaml
@@ -15,8 +15,10 @@ from pydantic import Field, StringConstraints, field_validator
 from tcs.errors import DataFileError, OutputError, one_line
 from tcs.files.documents import Document, JointPosition, Number, Position, checked, read_document
 from tcs.files.writing import make_folder, whole_file
-from tcs.teleop.arm import Arm
+from tcs.model.robots import load_robot
+from tcs.teleop.arm import Arm, load_arm, torso_height_of
 from tcs.teleop.line import Course, Line
+from tcs_studies.experiment.course import find_course
 from tcs_studies.experiment.trial import CONDITIONS, TIME_LIMIT
 
 STUDY_FILE = "study.yaml"
@@ -223,3 +225,39 @@ def check_arm(study: Study, arm: Arm) -> None:
     from tcs_studies.experiment.trial import check_course
 
     check_course(arm, study.course)
+
+
+def new_study(
+    folder: Path,
+    plan: Mapping[str, Any],
+    *,
+    conditions: Sequence[str],
+    line_seed: int = 0,
+) -> Study:
+    """Write the folder of a new study, and return it.
+
+    Args:
+        folder: The folder, made if it does not exist; it must not have a study.
+        plan: Keys of `study.yaml` without format version, line and conditions; `torso_height` may
+            be None for the middle of its range.
+        conditions: Names such as "novel", or names with titles such as "stick=Joystick".
+        line_seed: Seed of the search for the line.
+
+    Raises:
+        OutputError: If the folder has a study, or cannot be written.
+        DataFileError: If a value or a condition is invalid.
+        UnknownNameError: If the robot or a key is unknown.
+        TcsError: If no line is found for the robot.
+    """
+    check_new(folder)
+    entries = conditions_of(conditions)
+    robot = load_robot(plan["robot"])
+    arm = load_arm(robot, torso_height=torso_height_of(robot, plan["torso_height"]))
+    content = {
+        "format_version": VERSION,
+        **plan,
+        "torso_height": arm.torso_height,
+        "line": line_entry(find_course(arm, line_seed)).model_dump(),
+        "conditions": [one.model_dump() for one in entries],
+    }
+    return create_study(folder, checked(content, StudyFile, "study", DataFileError))

@@ -151,7 +151,7 @@ def live(
             typer.echo(f"wrote {save}: {len(run)} samples, {run.time[-1] - run.time[0]:.1f} s")
     if course is not None and run is not None:
         from tcs_studies.experiment.trial import line_result
-        from tcs_studies.output.teleop_tables import line_text
+        from tcs_studies.output.terminal_tables import line_text
 
         typer.echo(line_text(line_result(run, course.line)))
     terminal.note(session.page.timing())

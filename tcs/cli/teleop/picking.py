@@ -95,7 +95,7 @@ def pick_and_place(
     """Pick and place a cup from three base poses of TIAGo: the experiment of the ITCM thesis."""
     from tcs.teleop.control.latency import Latency
     from tcs_studies.output.report.pick_and_place.files import write_pick_and_place
-    from tcs_studies.output.teleop_tables import report_pick_and_place
+    from tcs_studies.output.terminal_tables import report_pick_and_place
     from tcs_studies.pick_and_place.master import Coupling
     from tcs_studies.pick_and_place.protocol import Plan
     from tcs_studies.pick_and_place.slave import Control

@@ -64,7 +64,7 @@ def experiment(
         make_experiment_folder,
         write_experiment,
     )
-    from tcs_studies.output.teleop_tables import report_experiment
+    from tcs_studies.output.terminal_tables import report_experiment
 
     words = ["tcs", "teleop", "experiment", "--robot", robot, "--operators", str(operators)]
     words += ["--trials", str(trials), "--training", str(training), "--seed", str(seed)]

@@ -28,13 +28,13 @@ def work(
     from tcs.teleop.line import GOAL_RADIUS
     from tcs.teleop.runs.files import load_run
     from tcs_studies.experiment.phases import attempt_work
-    from tcs_studies.output.teleop_tables import report_work
+    from tcs_studies.output.terminal_tables import report_work
 
     found = attempt_work(load_run(run), GOAL_RADIUS)
     result = {"file": str(run), **found.to_json(), "picture": picture and str(picture)}
     if picture is not None:
         from tcs.output.draw import save_figure
-        from tcs_studies.output.draw.work import WorkCurve, draw_work_over_time
+        from tcs_studies.output.draw.tool_paths import WorkCurve, draw_work_over_time
 
         curve = WorkCurve(run.name, found.time, found.work, found.solution)
         save_figure(picture, draw_work_over_time([curve]))

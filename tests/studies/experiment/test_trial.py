@@ -22,7 +22,7 @@ from tcs_studies.experiment.trial import (
     measure,
     run_trial,
 )
-from tcs_studies.operators.scripted import Experience, OperatorTraits
+from tcs_studies.operators import Experience, OperatorTraits
 
 
 @pytest.fixture(scope="module")

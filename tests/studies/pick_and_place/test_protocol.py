@@ -13,9 +13,10 @@ from tcs_studies.pick_and_place.analysis import (
     compared,
     learning_curve,
     normality,
+    summary,
     time_with_failures,
 )
-from tcs_studies.pick_and_place.measures import MEASURES, Measures
+from tcs_studies.pick_and_place.phases import Traits
 from tcs_studies.pick_and_place.protocol import (
     OperatorResult,
     Part,
@@ -23,10 +24,8 @@ from tcs_studies.pick_and_place.protocol import (
     Plan,
     run_pick_and_place,
 )
-from tcs_studies.pick_and_place.repetition import Outcome
-from tcs_studies.pick_and_place.summary import summary
+from tcs_studies.pick_and_place.repetition import MEASURES, Measures, Outcome
 from tcs_studies.pick_and_place.task import CONDITIONS, ITCM_HIGH
-from tcs_studies.pick_and_place.traits import Traits
 
 
 @pytest.fixture(scope="module")

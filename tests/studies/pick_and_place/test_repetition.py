@@ -11,12 +11,11 @@ import pytest
 from tcs.teleop.control.latency import Latency
 from tcs_studies.pick_and_place.cup import CupState
 from tcs_studies.pick_and_place.master import Coupling
-from tcs_studies.pick_and_place.measures import measure
 from tcs_studies.pick_and_place.operator import Experience, _misdirected
-from tcs_studies.pick_and_place.repetition import Outcome, _Performance, perform
+from tcs_studies.pick_and_place.phases import VARIED, Traits
+from tcs_studies.pick_and_place.repetition import Outcome, _Performance, measure, perform
 from tcs_studies.pick_and_place.slave import Control, orientation
 from tcs_studies.pick_and_place.task import FARTHEST, ITCM_HIGH
-from tcs_studies.pick_and_place.traits import VARIED, Traits
 
 TRAITS = Traits()
 

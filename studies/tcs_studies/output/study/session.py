@@ -14,7 +14,6 @@ from tcs.teleop.runs.files import load_run
 from tcs_studies.experiment.trial import TrialMeasures
 from tcs_studies.output.study.server import FormServer
 from tcs_studies.output.words import trial_words
-from tcs_studies.study.answers_file import load_answers
 from tcs_studies.study.participants import (
     ParticipantFile,
     exclusive_session,
@@ -24,7 +23,7 @@ from tcs_studies.study.participants import (
     participant_names,
     withdraw,
 )
-from tcs_studies.study.recording import StudyRecording
+from tcs_studies.study.recording import StudyRecording, load_answers
 from tcs_studies.study.steps import Step
 from tcs_studies.study.study_file import Study, load_study
 

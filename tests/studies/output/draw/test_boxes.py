@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from tcs.output.draw import as_png, as_svg
-from tcs_studies.output.draw.boxes import BoxGroup, BoxPlot, draw_boxes
-from tcs_studies.output.draw.scatter import Cloud, draw_clouds
+from tcs_studies.output.draw.boxes import BoxGroup, BoxPlot, Cloud, draw_boxes, draw_clouds
 
 SERIES = ("ours", "theirs")
 

@@ -7,12 +7,13 @@ import pytest
 from matplotlib.colors import to_rgba
 
 from tcs_studies.output.draw.boxes import COLOURS
-from tcs_studies.output.draw.participants import ParticipantPanel, draw_participants
 from tcs_studies.output.draw.repetitions import (
     LearningPart,
+    ParticipantPanel,
     RepetitionGroup,
     draw_distances,
     draw_learning,
+    draw_participants,
     draw_paths,
 )
 

@@ -6,8 +6,8 @@ import dataclasses
 
 import pytest
 
+from tcs_studies.output.report.robustness.page import draw_row
 from tcs_studies.output.report.robustness.paper import Paper, load_paper
-from tcs_studies.output.report.robustness.row_pictures import draw_row
 from tcs_studies.robustness.study import StudyPlan, study_row
 from tests.output.report.conftest import score_path
 

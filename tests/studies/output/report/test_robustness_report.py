@@ -11,8 +11,7 @@ import pytest
 from tcs.errors import OutputError
 from tcs.output.report import as_html, as_markdown
 from tcs.output.words import REASON_TEXTS
-from tcs_studies.output.report.robustness.page import robustness_page
-from tcs_studies.output.report.robustness.row_pictures import draw_rows
+from tcs_studies.output.report.robustness.page import draw_rows, robustness_page
 from tcs_studies.output.report.robustness.tables import is_short, losses_table, table_1, table_3
 from tcs_studies.output.report.robustness.write import write_report
 from tcs_studies.output.words import goes_with, lost_goal

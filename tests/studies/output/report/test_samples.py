@@ -8,7 +8,7 @@ import io
 import numpy as np
 import pytest
 
-from tcs_studies.output.report.robustness.samples import evaluations, samples_csv
+from tcs_studies.output.report.robustness.write import evaluations, samples_csv
 
 
 @pytest.fixture(scope="module")

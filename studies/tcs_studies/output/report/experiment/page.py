@@ -30,8 +30,8 @@ from tcs_studies.experiment.within_subject import (
     ExperimentPlan,
     median_ratio,
 )
-from tcs_studies.operators.scripted import OperatorTraits
-from tcs_studies.output.report.experiment.pictures import box_pictures, paths_picture
+from tcs_studies.operators import OperatorTraits
+from tcs_studies.output.report.experiment.pictures import box_pictures, paths_picture, work_blocks
 from tcs_studies.output.report.experiment.tables import (
     PAPER,
     group_table,
@@ -44,7 +44,6 @@ from tcs_studies.output.report.experiment.tables import (
     title_of,
     trials_table,
 )
-from tcs_studies.output.report.experiment.work import work_blocks
 from tcs_studies.output.words import NAMES
 
 _STEERING = (

@@ -14,9 +14,9 @@ from tcs.output.draw import save_figure
 from tcs.output.report.html import as_html
 from tcs.output.report.markdown import as_markdown
 from tcs_studies.output.report.pick_and_place.page import PANELS, figures, pick_and_place_page
-from tcs_studies.pick_and_place.measures import MEASURES
+from tcs_studies.pick_and_place.analysis import summary
 from tcs_studies.pick_and_place.protocol import PickAndPlace, Plan, run_pick_and_place
-from tcs_studies.pick_and_place.summary import summary
+from tcs_studies.pick_and_place.repetition import MEASURES
 
 FILES = ("pick-and-place.html", "pick-and-place.md", "repetitions.csv")
 PICTURES = tuple(f"{name}.png" for name in (*PANELS, "figure-51", "figure-52", "figure-53"))

@@ -24,12 +24,13 @@ from tcs.output.report.blocks import (
 )
 from tcs.output.report.machine import machine, today, versions
 from tcs.output.words import p_value
-from tcs_studies.output.draw.participants import ParticipantPanel, draw_participants
 from tcs_studies.output.draw.repetitions import (
     LearningPart,
+    ParticipantPanel,
     RepetitionGroup,
     draw_distances,
     draw_learning,
+    draw_participants,
     draw_paths,
 )
 from tcs_studies.output.report.experiment.tables import number
@@ -45,6 +46,7 @@ from tcs_studies.output.report.pick_and_place.tables import (
 )
 from tcs_studies.output.words import PICK_AND_PLACE
 from tcs_studies.pick_and_place.analysis import compared, learning_curve
+from tcs_studies.pick_and_place.phases import Traits
 from tcs_studies.pick_and_place.protocol import Part, PickAndPlace
 from tcs_studies.pick_and_place.task import (
     BASE_RADIUS,
@@ -57,7 +59,6 @@ from tcs_studies.pick_and_place.task import (
     TABLE_WIDTH,
     Condition,
 )
-from tcs_studies.pick_and_place.traits import Traits
 
 THESIS_RATIOS = {"tct": 71, "csa": 78, "cst": 34}
 """Increase from ITCM-high to ITCM-low in the thesis [%] (abstract and section V)."""

@@ -12,8 +12,13 @@ import pytest
 from tcs.teleop.control.session import Step
 from tcs.teleop.control.settings import Command, Mode, Settings
 from tcs.teleop.line import Line
-from tcs_studies.operators.gauss_markov import GaussMarkovProcess
-from tcs_studies.operators.scripted import Experience, OperatorTraits, Recovery, ScriptedOperator
+from tcs_studies.operators import (
+    Experience,
+    GaussMarkovProcess,
+    OperatorTraits,
+    Recovery,
+    ScriptedOperator,
+)
 
 LINE = Line((0.0, 0.0, 1.0), (1.0, 0.0, 1.0))
 SETTINGS = Settings(limits="paper")

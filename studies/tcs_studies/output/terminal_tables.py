@@ -1,4 +1,4 @@
-"""Results of teleoperation as text: how a line was followed, and the experiment."""
+"""Results of experiments and studies as text for the terminal."""
 
 from __future__ import annotations
 
@@ -101,3 +101,30 @@ def _mean_std(spread: dict[str, float | None]) -> str:
     if mean is None:
         return "–"
     return f"{mean:.3g}" if std is None else f"{mean:.3g} ({std:.3g})"
+
+
+def report_study(result: dict[str, Any]) -> None:
+    """Print medians, tests, preferences, what is missing, and files."""
+    out = results_console()
+    included = sum(one["included"] for one in result["participants"])
+    out.print(f"{result['title']}: {included} of {len(result['participants'])} participants")
+    conditions = list(result["preferred"])
+    table = new_table("median", *(f">{name}" for name in conditions), ">N", ">signed rank p", ">r")
+    for name, groups in result["groups"].items():
+        scale = SCALE.get(name, 1.0)
+        medians = [groups[condition]["median"] for condition in conditions]
+        cells = ["–" if one is None else f"{scale * one:.3g}" for one in medians]
+        tests = list(result["tests"].get(name, {}).values())
+        # Several pairs do not fit the line; the page has them.
+        test = tests[0] if len(tests) == 1 else None
+        cells += ["", "", ""] if test is None else [
+            str(test["count"]), p_value(test["p"]), f"{test['effect']:.3f}",
+        ]  # fmt: skip
+        table.add_row(NAMES[name], *cells)
+    out.print(table)
+    preferred = ", ".join(f"{name} {count}" for name, count in result["preferred"].items())
+    out.print(f"preferred: {preferred}")
+    for note in result["notes"]:
+        out.print(note)
+    page, *tables = result["files"]
+    out.print(f"wrote {page}, and {len(tables)} tables as CSV beside it")
