@@ -19,6 +19,7 @@ from tcs.model.robots import load_robot, robot_names, robot_urdf
 from tcs.model.robots.extras import model_with_extras
 from tcs.model.robots.urdf.pose import pose_in_root
 from tcs_shapes.self_collision import SelfCollision, sample_positions
+from tests.chosen import some_of
 
 DOCS = Path(__file__).parents[3] / "docs" / "robots.md"
 LICENCE = re.compile(r"BSD|Apache-2\.0|MIT|CC BY")
@@ -94,6 +95,9 @@ def test_kinematics_agree_with_drake(robot, model):
         np.testing.assert_allclose(p, X_BT.translation(), atol=1e-12)
 
 
+@pytest.mark.parametrize(
+    "robot", some_of(robot_names(), "tiago", "ur5", "stretch", "fr3", "gen3"), indirect=True
+)
 def test_rest_is_free_of_self_collision_at_every_torso_height(robot, model):
     moved, hand = (model.links_moved_by(robot.arm_joints[i]) for i in (0, -1))
     disabled = {frozenset(pair) for pair in robot.disabled_pairs}

@@ -10,6 +10,7 @@ import pytest
 from pydrake.geometry import Role
 
 from tcs.errors import EnvironmentFileError, TcsError, UnknownNameError
+from tcs.model.robots import load_robot
 from tcs.model.scene import (
     EnvironmentFile,
     ErrorDistribution,
@@ -22,6 +23,12 @@ from tcs.model.scene.contacts import Group
 
 # Elbow bent, hand in front of the shoulder: free of the robot itself.
 REACHING = np.array([0.3, 0.2, 0.5, -1.2, 0.4, -0.8, 0.2])
+
+
+@pytest.fixture(scope="module")
+def small(wheelchair):
+    """A robot of twenty shapes and the wheelchair."""
+    return SceneSpec(load_robot("iiwa7"), wheelchair)
 
 
 def with_changes(spec, **changes):
@@ -264,12 +271,12 @@ def test_a_box_of_the_users_own_blocks_the_arm(spec, scene):
     [("", FIXED), (STATIC, ""), (STATIC, FIXED)],
     ids=["jointed", "static", "static and jointed"],
 )
-def test_a_model_of_the_users_own_is_placed_by_the_environment_file(spec, tmp_path, static, joint):
+def test_a_model_of_the_users_own_is_placed_by_the_environment_file(small, tmp_path, static, joint):
     path = tmp_path / "shelf.sdf"
     path.write_text(SHELF.format(static=static, z=0.2, shape=BOARD, joint=joint))
     turned = Obstacle(name="left shelf", file=str(path), xyz=(1, 2, 0.1), rpy_deg=(0, 0, 90))
     plain = Obstacle(name="shelf", file=str(path), xyz=(0, -3, 0))
-    scene = obstacle_scene(spec, turned, plain)
+    scene = obstacle_scene(small, turned, plain)
     poses = shape_poses(scene)
     for name, where in {
         "left shelf::top": [1, 2, 0.3],
@@ -298,16 +305,18 @@ def test_a_model_of_the_users_own_is_placed_by_the_environment_file(spec, tmp_pa
     ],
     ids=["cylinder", "loose link", "two models", "torn box", "hung"],
 )
-def test_a_model_that_cannot_be_used_is_refused_in_one_line(spec, tmp_path, shape, joint, expected):
+def test_a_model_that_cannot_be_used_is_refused_in_one_line(
+    small, tmp_path, shape, joint, expected
+):
     path = tmp_path / "shelf.sdf"
     path.write_text(SHELF.format(static="", z=0, shape=shape, joint=joint))
     with pytest.raises(EnvironmentFileError, match=expected) as caught:
-        obstacle_scene(spec, Obstacle(name="shelf", file=str(path)))
+        obstacle_scene(small, Obstacle(name="shelf", file=str(path)))
     assert "\n" not in str(caught.value)
 
 
-def test_names_that_are_not_there_are_refused(spec):
-    environment = spec.environment
+def test_names_that_are_not_there_are_refused(small):
+    environment = small.environment
     entry = ModelEntry(name="copy", file=environment.models[0].file, parent="person::hed")
     bends = {"person_x": ErrorDistribution(distribution="normal", std_deg=1.0)}
     for changes, expected in (
@@ -317,12 +326,12 @@ def test_names_that_are_not_there_are_refused(spec):
         ({"joints": {"bed_height": 0.1}}, r"'joints': unknown joint 'bed_height'"),
     ):
         with pytest.raises(UnknownNameError, match=expected):
-            Scene(with_changes(spec, **changes))
+            Scene(with_changes(small, **changes))
     with pytest.raises(EnvironmentFileError, match=r"'errors', joint 'person_x'.*prismatic.*'std'"):
-        Scene(with_changes(spec, errors=bends))
+        Scene(with_changes(small, errors=bends))
     twice = environment.models[0].model_copy(update={"name": "second chair"})
     with pytest.raises(EnvironmentFileError, match="'wheelchair_x' exists twice"):
-        Scene(with_changes(spec, models=(*environment.models, twice)))
+        Scene(with_changes(small, models=(*environment.models, twice)))
 
 
 def test_allowed_contacts_are_not_checked(spec):
