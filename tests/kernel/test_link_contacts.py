@@ -62,6 +62,7 @@ def place_all(problem, work):
         place_link(problem, work, i)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_pair_is_the_first_that_touches(lowered, seed):
     chain, rng = chain_of(seed, lowered), np.random.default_rng(seed)

@@ -185,6 +185,7 @@ def test_the_file_keeps_the_folders_of_packages(tmp_path):
     assert load_robot(moved / "mine" / "arm.yaml").model().links.keys() >= {"arm1", "tool"}
 
 
+@pytest.mark.slow
 def test_a_rest_posture_is_found_where_zero_collides(tmp_path):
     """A wall in front of the mast touches the arm at zero."""
     wall = (
@@ -394,6 +395,7 @@ def test_a_robot_without_any_shape_is_refused(tmp_path):
         draft_robot(file, "tool")
 
 
+@pytest.mark.slow
 def test_flat_parts_get_a_shape(tmp_path):
     flat = tmp_path / "plate.stl"
     flat.write_text(

@@ -224,6 +224,7 @@ def test_bodies_welded_to_the_base_are_checked_with_it(tmp_path):
     assert frozenset(("arm1", "arm2")) in off
 
 
+@pytest.mark.slow
 def test_processes_find_the_pairs_that_one_finds(tmp_path):
     (tmp_path / "made_up.urdf").write_text(urdf())
     draft = draft_robot(tmp_path / "made_up.urdf", "tool")
@@ -252,6 +253,7 @@ def test_shipped_pairs_are_what_the_search_finds(pr2):
     assert len(more) <= 3
 
 
+@pytest.mark.slow
 def test_postures_that_shapes_alone_block_are_counted(pr2):
     found = blocked_by_shapes(pr2, postures=25)
     assert found.blocked <= found.free <= 25

@@ -153,6 +153,7 @@ def test_shapes_that_leave_surface_bare_are_refused(drums, around):
         Splitting("b", [around.shrunk(0.01)], drums, cleared(drums, [around], 0))
 
 
+@pytest.mark.slow
 def test_a_link_of_a_robot_is_split_and_the_others_keep_their_shapes(pr2):
     before = read_primitives(Path(pr2.primitives))
     name = "r_wrist_roll_link"

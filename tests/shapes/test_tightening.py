@@ -187,6 +187,7 @@ def test_shapes_that_leave_surface_bare_are_refused(steps, wide):
         Tightening("b", (wide[0].shrunk(0.01),), steps)
 
 
+@pytest.mark.slow
 def test_other_bodies_keep_their_shapes(pr2):
     before = read_primitives(Path(pr2.primitives))
     names = {"l_gripper_l_finger_tip_link": 3, "l_gripper_r_finger_tip_link": 1}

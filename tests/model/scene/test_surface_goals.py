@@ -118,7 +118,7 @@ def test_weights_are_shared_by_the_goals_of_a_surface():
     ("changes", "error", "message"),
     [
         ({"body": "trunk"}, UnknownNameError, "unknown body frame 'trunk'"),
-        ({"spacing": 0.006}, TaskError, "at most 1,000 are allowed. Take a spacing of 0.01"),
+        ({"spacing": 0.008}, TaskError, "at most 1,000 are allowed. Take a spacing of 0.01"),
         ({"body": "head", "distance": 0.3, "spacing": 0.5}, None, ""),
         ({"spacing": 0.001}, TaskError, "'spacing' is 0.001 m, but must be 0.005 to 0.5 m"),
         ({"distance": 4.0}, TaskError, "'distance' is 4 m, but must be 0 to 0.3 m"),

@@ -39,7 +39,7 @@ def postures(specs):
     robot = specs[0].robot
     tables = tables_in_force(robot)
     limits = np.array([robot.joint_limits()[name] for name in robot.arm_joints])
-    chosen, wanted = [], {True: 40, False: 15}
+    chosen, wanted = [], {True: 20, False: 8}
     while any(wanted.values()):
         q = rng.uniform(*limits.T)
         at = dict(zip(robot.arm_joints, q, strict=True))

@@ -306,6 +306,7 @@ def test_a_false_answer_ends_in_an_exit_code(false_path, tmp_path):
     assert "SOME ANSWERS OF THE FILE ARE FALSE" in out.read_text()
 
 
+@pytest.mark.slow
 def test_a_measure_that_is_not_that_of_the_posture_is_found(score_path, tmp_path):
     file = load_scores(score_path)
     scores = file.nominal.scores

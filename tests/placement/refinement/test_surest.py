@@ -207,6 +207,7 @@ def test_pairs_that_lose_nothing_get_no_third_member(of_three, search, monkeypat
     assert surest_triples(search.staged, search, sets, pairs) == []
 
 
+@pytest.mark.slow
 def test_walks_are_surer_in_all_samples_with_every_move(search, scored):
     sets = scored.nominal.sets
     walks, _ = search.run([sets.best_single], 2, lambda done, total: None)
