@@ -16,10 +16,11 @@ from table import header, parser, record, row, save
 
 import tcs
 from tcs.output.words import p_value
-from tcs.placement.robustness import Trials, evaluate, rank_sum
+from tcs.placement.robustness import Trials, evaluate
 from tcs.placement.scoring import default_path
 from tcs_studies.output.report.robustness.paper import load_paper
 from tcs_studies.output.words import mean_and_std
+from tcs_studies.robustness.differences import rank_sum
 
 ROBOT = "pr2"
 COLUMNS = (

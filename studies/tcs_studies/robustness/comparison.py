@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from tcs.placement.robustness.evaluation import Evaluation, evaluate
-from tcs.placement.robustness.statistics import Difference, rank_sum, signed_rank
 from tcs.placement.robustness.trials import Errors, Progress, Trials
 from tcs.placement.store import ScoreFile
+from tcs_studies.robustness.differences import Difference, rank_sum, signed_rank
 
 Method = tuple[int, bool]
 """Number of members of the set, and whether TC-manipulability selects it."""

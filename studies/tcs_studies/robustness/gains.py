@@ -13,10 +13,11 @@ from tcs.errors import SelectionError, TcsError
 from tcs.model.random_streams import check_draws, named_generator
 from tcs.placement.robustness.evaluation import Evaluation, evaluate
 from tcs.placement.robustness.pairs import EQUAL_REACHABILITY, Pairs, kept_pairs
-from tcs.placement.robustness.statistics import CONFIDENCE, Difference, signed_rank
+from tcs.placement.robustness.statistics import CONFIDENCE
 from tcs.placement.robustness.trials import Trials
 from tcs.placement.tables import tc_reachability
 from tcs.placement.tables.rules import FRACTION_TOLERANCE
+from tcs_studies.robustness.differences import Difference, signed_rank
 
 STRATA = 10
 """Number of equal strata of P_M, from each of which the same number of sets is drawn."""

@@ -15,12 +15,11 @@ from tcs.placement.robustness.estimation import (
 )
 from tcs.placement.robustness.evaluation import SELECTIONS, Evaluation, evaluate
 from tcs.placement.robustness.perturbed_points import PerturbedPoints
-from tcs.placement.robustness.statistics import Difference, Mean, mean_of, rank_sum, signed_rank
+from tcs.placement.robustness.statistics import Mean, mean_of
 from tcs.placement.robustness.trials import Trials
 
 __all__ = [
     "SELECTIONS",
-    "Difference",
     "ErrorFile",
     "ErrorModel",
     "Evaluation",
@@ -29,9 +28,7 @@ __all__ = [
     "Trials",
     "evaluate",
     "mean_of",
-    "rank_sum",
     "robustify",
-    "signed_rank",
     "success_of",
     "success_summary",
     "with_success",
