@@ -10,6 +10,7 @@ from tcs.kernel.cache import jit
 from tcs.kernel.collide import BOUND, CENTRE, ROTATION, SIZE, TYPE, closer, pack
 from tcs.kernel.group_contacts import group_touches, groups_touch
 from tcs.kernel.groups import CLUSTER, groups_of, with_boxes, with_group_rows
+from tests.chosen import some_of
 from tests.kernel.shapes import as_shapes, placed, random_size, rotation
 
 MANY = 5 * CLUSTER
@@ -107,7 +108,7 @@ def test_shapes_of_a_cluster_are_neighbours(number):
             assert extent < whole / 2 if several else extent == whole
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", some_of(range(12), 0, 1, 2, 3))
 def test_clusters_leave_no_contact_out(seed):
     rng = np.random.default_rng(seed)
     sizes = ((MANY, 3, 1, CLUSTER + 1, 2 * MANY), (1, MANY, 5, 2 * CLUSTER))

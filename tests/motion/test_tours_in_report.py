@@ -60,6 +60,7 @@ def test_the_section_lists_every_segment_and_every_failure(measured, planned):
     assert failures.items[0].startswith("goal 2: joint or velocity limits prevent its approach")
 
 
+@pytest.mark.slow
 def test_the_command_plans_the_set_that_it_shows(planned, two_goals, monkeypatch, tmp_path):
     asked = []
     monkeypatch.setattr(score_report, "plan", lambda _, members: asked.append(members) or planned)

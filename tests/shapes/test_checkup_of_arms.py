@@ -58,6 +58,7 @@ def test_a_wrong_solver_is_detected(pr2):
     assert round_trip(scene, longer, 20, seed=0).recovered == 0
 
 
+@pytest.mark.slow
 def test_a_numeric_solver_that_finds_too_little_is_a_problem(pr2):
     found = check_up(pr2, samples=1)
     outside = replace(found.arm, name=None, solver=None, reason="Axes pass each other.")

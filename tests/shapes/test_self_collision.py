@@ -70,6 +70,7 @@ def test_leaving_out_settled_pairs_changes_no_verdict(tmp_path):
     assert [set(plant.touching(q)) for q in drawn] == scored
 
 
+@pytest.mark.slow
 def test_pairs_that_lose_the_shapes_followed_are_found_by_comparing_all(pr2, judge):
     whole, plant = judge, SelfCollision(pr2)
     first, *others = sample_positions(pr2, 6, seed=3)

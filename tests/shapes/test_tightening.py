@@ -83,6 +83,7 @@ def test_a_tilted_bar_gets_a_tilted_box():
     assert box.volume == pytest.approx(0.2 * 0.03 * 0.02, rel=0.01)
 
 
+@pytest.mark.slow
 def test_rotated_boxes_protrude_less(steps, monkeypatch):
     """Drums that no box along the axes follows, with and without the rotation of boxes."""
     R = Rotation.from_euler("xyz", (30, 30, 30), degrees=True).as_matrix()
@@ -98,6 +99,7 @@ def test_rotated_boxes_protrude_less(steps, monkeypatch):
     assert excess[0] < 0.93 * excess[1]
 
 
+@pytest.mark.slow
 def test_splits_go_where_spots_are(steps):
     """A box around two drums, both as far from it: the volume beside that in a spot goes first."""
     box = enclose("b", corner_points(steps), "box", np.eye(3))

@@ -277,6 +277,7 @@ def test_pandas_wrist_keeps_its_range_because_the_hand_is_checked_against_the_fo
     assert not touching[-5:].any()
 
 
+@pytest.mark.slow
 def test_the_lift_of_stretch_comes_near_the_head_only_beyond_its_range():
     """It moves straight up, and is nearest at the end."""
     robot = load_robot("stretch")

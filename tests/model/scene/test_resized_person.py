@@ -140,8 +140,18 @@ def test_the_person_is_on_the_seat_or_on_the_mattress(alone, who):
     assert hips[0] == pytest.approx(hips[1], abs=1e-6)
 
 
+SIZES = [(5, 5), (5, 95), (95, 5), (95, 95), (20, 97)]
+"""Percentiles of height and weight."""
+EXTREMES = [(5, 95), (95, 5)]
+"""Those whose proportions are farthest from the mean."""
+
+
 @pytest.mark.parametrize("name", ["wheelchair", "bed"])
-@pytest.mark.parametrize("percentiles", [(5, 5), (5, 95), (95, 5), (95, 95), (20, 97)])
+@pytest.mark.parametrize(
+    "percentiles",
+    [pytest.param(at, marks=[] if at in EXTREMES else pytest.mark.slow) for at in SIZES],
+    ids=str,
+)
 def test_padded_shapes_enclose_the_skin_stretched_like_their_link(name, percentiles, rng):
     file = load_environment(name)
     stature, mass = percentiles

@@ -243,6 +243,7 @@ def test_success_and_its_pairs_through_the_product(scored, monkeypatch):
     assert found >= before
 
 
+@pytest.mark.slow
 def test_sets_of_three_through_the_product(of_three, monkeypatch):
     monkeypatch.setattr("tcs.placement.refinement.refined_file.FRESH_SAMPLES", 30)
     options = {"objective": "success", "starts": 1, "rounds": 1, "samples": SAMPLES}
