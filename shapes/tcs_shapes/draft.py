@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tcs.errors import OutputError, RobotError, UnknownNameError
 from tcs.files.writing import check_writable, scratch_folder, whole_file
 from tcs.files.xml_documents import read_xml
-from tcs.model.robots.checks import check_robot
+from tcs.model.robots.loading import check_robot
 from tcs.model.robots.primitives import Primitive, write_primitives
 from tcs.model.robots.robot_file import (
     ExtraFrame,

@@ -8,8 +8,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.model.robots.distances.sources import source_digest
-from tcs.model.robots.distances.table import FARTHEST, UNIT, DistanceTable
+from tcs.model.robots.distances import FARTHEST, UNIT, DistanceTable, source_digest
 from tcs.model.robots.extras import model_with_extras
 from tcs.model.robots.robot_file import RobotFile
 from tcs_shapes.clearance import carried_triangles, joints_between

@@ -18,6 +18,8 @@ import tcs.kernel.verification.reference_distances as reference_distances
 from tcs.errors import RobotError
 from tcs.model.robots import Primitive, load_robot
 from tcs.model.robots.distances import (
+    FARTHEST,
+    NOTHING,
     UNIT,
     DistanceTable,
     body_surface,
@@ -27,7 +29,6 @@ from tcs.model.robots.distances import (
     tables_in_force,
     write_tables,
 )
-from tcs.model.robots.distances.table import FARTHEST, NOTHING
 from tcs.model.robots.extras import model_with_extras
 from tcs.model.robots.urdf.pose import pose_in_root
 from tcs.model.robots.urdf.surfaces import surface_geometries

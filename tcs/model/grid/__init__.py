@@ -9,8 +9,7 @@ from __future__ import annotations
 from tcs.model.grid.axis import Axis
 from tcs.model.grid.condition import AxisCondition, restricted
 from tcs.model.grid.configuration import ENVIRONMENT_UNITS, InitialConfiguration
-from tcs.model.grid.grid import MAX_CONFIGURATIONS, ROBOT_AXES, Grid
-from tcs.model.grid.thinning import thinned
+from tcs.model.grid.grid import MAX_CONFIGURATIONS, ROBOT_AXES, Grid, thinned
 
 __all__ = [
     "ENVIRONMENT_UNITS",

@@ -12,14 +12,7 @@ from tcs.model.people.bodies import Bodies, Body, body, draw_bodies
 from tcs.model.people.children import ADULT, YOUNGEST, survey_at
 from tcs.model.people.joints import JOINTS, NamedPosture, named_postures, range_of_motion
 from tcs.model.people.people_file import load_people
-from tcs.model.people.person import (
-    WORDS,
-    Person,
-    PersonEntry,
-    PersonLike,
-    load_person,
-    person_keys,
-)
+from tcs.model.people.person import WORDS, Person, PersonEntry, PersonLike, load_person, person_keys
 from tcs.model.people.proportions import (
     LINKS,
     PAPERS_MAN,

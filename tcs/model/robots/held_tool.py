@@ -10,8 +10,7 @@ from pydantic import Field, model_validator
 from tcs.errors import RobotError
 from tcs.files.documents import Document, Entries, Placed, read_document
 from tcs.files.paths import DataFiles, expanded
-from tcs.model.robots.checks import check_robot
-from tcs.model.robots.loading import ROBOTS
+from tcs.model.robots.loading import ROBOTS, check_robot
 from tcs.model.robots.loading import load_robot as load_bare_robot
 from tcs.model.robots.robot_file import BodyPrimitive, ExtraBody, ExtraFrame, Name, RobotFile
 

@@ -6,7 +6,6 @@ and its lowering to arrays, from which the kernel computes the same.
 
 from __future__ import annotations
 
-from tcs.model.scene.body_frames import body_frame_positions
 from tcs.model.scene.environment.environment_file import (
     EMPTY_ENVIRONMENT,
     EnvironmentFile,
@@ -32,7 +31,7 @@ from tcs.model.scene.observation import JointEstimate, Observation, estimate_joi
 from tcs.model.scene.person.goals import goals_on_person
 from tcs.model.scene.person.people import PeopleInScene
 from tcs.model.scene.person.posture import Posture
-from tcs.model.scene.scene import Contact, Scene
+from tcs.model.scene.scene import Contact, Scene, body_frame_positions
 from tcs.model.scene.spec import SceneSpec
 from tcs.model.scene.surface_goals import with_surface_goals
 from tcs.model.scene.turning import axis_of_turn

@@ -13,6 +13,7 @@ from pydrake.systems.framework import Context
 
 from tcs.errors import TcsError, UnknownNameError
 from tcs.kernel.arrays import FloatArray
+from tcs.model.grid import Grid
 from tcs.model.scene.attached import AttachedPoses
 from tcs.model.scene.contacts import Group, Part
 from tcs.model.scene.plant import ScenePlant, build_plant
@@ -355,3 +356,29 @@ def least_distances(pairs: Iterable[tuple[Part, Part, float]]) -> tuple[Contact,
         least[names] = min(distance, least.get(names, np.inf))
     found = [(a, b, float(distance)) for (a, b), distance in least.items()]
     return tuple(sorted(found, key=lambda contact: (contact[2], contact[:2])))
+
+
+def body_frame_positions(scene: Scene, grid: Grid) -> dict[str, list[float]]:
+    """Return the position of each body frame in M for each environment state of a grid.
+
+    M is the frame of the base poses: W, or that of the environment's mount.
+
+    Args:
+        scene: The scene; its state is restored.
+        grid: The grid, whose environment axes move the joints of the same name.
+
+    Returns:
+        By name of the body frame: x, y, z [m] of all states, concatenated in C order over the axes.
+    """
+    before = scene.positions()
+    positions: dict[str, list[float]] = {name: [] for name in scene.built.body_frames}
+    try:
+        for state in grid.environment_states():
+            for joint, value in state.items():
+                scene.set_joint(joint, value)
+            for name, numbers in positions.items():
+                (X_MH,) = scene.seen_from_mount([scene.body_frame_pose(name)])
+                numbers.extend(X_MH.translation().tolist())
+    finally:
+        scene.restore(before)
+    return positions

@@ -17,10 +17,10 @@ from tcs.files.quantities import SIZE
 from tcs.files.reading import read_bytes
 from tcs.files.unchanged import kept_while_unchanged
 from tcs.files.writing import whole_file
-from tcs.model.robots.urdf.collada import geometry_only
 
 if TYPE_CHECKING:
     import trimesh
+import xml.etree.ElementTree as ElementTree
 
 FloatArray = NDArray[np.float64]
 
@@ -33,6 +33,19 @@ MAX_COORDINATE = SIZE.high * 1e4
 
 _VERSION = b"3"
 """Part of the cache key: increase it when the conversion changes."""
+_APPEARANCE = frozenset(
+    (
+        "library_images",
+        "library_effects",
+        "library_materials",
+        "library_cameras",
+        "library_lights",
+        "bind_material",
+        "instance_camera",
+        "instance_light",
+    )
+)
+"""Elements that say how geometry looks, or from where it is seen."""
 
 
 def as_obj(mesh: Path) -> Path:
@@ -134,3 +147,34 @@ def _check(mesh: Path, loaded: trimesh.Trimesh) -> None:
             f"mesh '{mesh}' has a coordinate that is not a number from {-MAX_COORDINATE:g} to "
             f"{MAX_COORDINATE:g}."
         )
+
+
+def geometry_only(content: bytes) -> tuple[bytes, float]:
+    """Return a Collada file without materials, images, cameras and lights, and its unit [m].
+
+    A reader of Collada leaves out geometry whose material it cannot read: the surface would be lost
+    without a word.
+
+    Args:
+        content: The file.
+
+    Raises:
+        SyntaxError: If it is not XML.
+        ValueError: If its unit is no length.
+    """
+    root = ElementTree.fromstring(content)
+    for parent in list(root.iter()):
+        for child in list(parent):
+            if child.tag.rpartition("}")[2] in _APPEARANCE:
+                parent.remove(child)
+    return ElementTree.tostring(root), _unit(root)
+
+
+def _unit(root: ElementTree.Element) -> float:
+    """Return the length of the unit of a Collada file [m], 1 if it names none."""
+    found = root.find("{*}asset/{*}unit")
+    text = "1" if found is None else found.get("meter", "1")
+    unit = float(text)
+    if not 1e-6 <= unit <= 1e3:
+        raise ValueError(f"its unit is {text} m")
+    return unit
