@@ -28,7 +28,6 @@ from tcs.kernel.motion.postures import postures_at
 from tcs.kernel.motion.scene import NO_PAIR, MotionScene, MotionWorkspace
 from tcs.kernel.motion.trees import new_trees
 from tcs.kernel.verification.newton_solutions import newton_solutions, within
-from tcs.kernel.verification.reference import jacobian, link_poses
 from tcs.model.scene import NeighbourList
 from tcs.motion.recheck import CLEARANCE_ROUNDING
 from tcs.motion.stops import Stop, StopGrid
@@ -36,6 +35,7 @@ from tcs.placement.robustness.statistics import binomial_interval
 from tcs.placement.scoring import load_job, sweep
 from tcs.placement.scoring.approaches import approach_lines
 from tcs.placement.tables import Reason
+from tests.reference.kinematics import jacobian, link_poses
 
 TASK = ("shaving", "wheelchair")
 ROBOTS = ("pr2", "tiago", "iiwa7", "panda", "fr3", "ur5", "jaco", "stretch")

@@ -4,7 +4,7 @@ Usage: python benchmarks/edges.py [--robots pr2 tiago iiwa7 panda] [--goals 400]
 
 Postures are drawn first, with one joint a given angle from singular or in a window of the free
 joint a given width, in the wheelchair's environment with shapes added about the robot; see
-`tcs.kernel.verification.constructed`. A goal is missed if it is not reached. The shortfall counts
+`tests.reference.constructed`. A goal is missed if it is not reached. The shortfall counts
 goals at which the stored measure is more than 1e-3 below that of the posture that made the goal.
 """
 
@@ -19,7 +19,10 @@ import numpy as np
 from table import header, parser, record, row, save
 
 from tcs.kernel.scores import REACHED
-from tcs.kernel.verification.constructed import (
+from tcs.kernel.verification.plain_dexterity import isotropy
+from tcs.placement.scoring import load_job
+from tcs.placement.tables import Reason
+from tests.reference.constructed import (
     ELBOW,
     SHOULDER,
     WRIST,
@@ -28,9 +31,7 @@ from tcs.kernel.verification.constructed import (
     between_limits,
     near_singular_goals,
 )
-from tcs.kernel.verification.reference import isotropy, jacobian
-from tcs.placement.scoring import load_job
-from tcs.placement.tables import Reason
+from tests.reference.kinematics import jacobian
 
 AWAY = (0.1, 0.06, 0.01, 0.003, 1e-3, 1e-4, 0.0)
 """How far a joint is from singular [rad]."""

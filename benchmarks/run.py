@@ -21,12 +21,12 @@ import numpy as np
 from table import cell, header, parser, row, save, spread, verification_text
 
 from tcs.kernel.problem import build_problem
-from tcs.kernel.verification import reference_pairs
 from tcs.model.grid import InitialConfiguration
 from tcs.placement.scoring import build_sets, load_job, score, sweep, verify, warm_up
 from tcs.placement.selection import SelectionTables, select
 from tcs.placement.store import load_scores, save_scores
 from tcs.placement.tables import Reason
+from tests.reference import pairs as reference_pairs
 
 REFERENCE_PAIRS = 12
 PLACES = 1000

@@ -26,9 +26,9 @@ from table import cell, header, parser, row, save
 from tcs.kernel.arrays import Chain, FloatArray
 from tcs.kernel.six_joints.arm import six_joint_arm
 from tcs.kernel.six_joints.solutions import MOST_SOLUTIONS, solve_poses
-from tcs.kernel.verification.reference import compose, link_poses
 from tcs.model.robots import load_robot
 from tcs.model.scene import EMPTY_ENVIRONMENT, Scene, SceneSpec, arm_chain
+from tests.reference.kinematics import compose, link_poses
 
 SAME = 1e-5
 """Greatest difference of equal joint angles [rad]; next to a singularity both are less exact."""

@@ -12,8 +12,8 @@ import pytest
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
-from tcs.kernel.verification.reference import link_poses
 from tcs.placement.scoring import load_job
+from tests.reference.kinematics import link_poses
 
 FOLDER = Path(__file__).resolve().parents[1] / "benchmarks"
 WITHOUT_PEERS = """

@@ -1,7 +1,7 @@
 """Kinematics of an arm of seven revolute joints: link poses, tool pose, Jacobian, pose error.
 
 `tcs.kernel.arrays.Chain` defines the frames. `tool_pose` and `jacobian` can be called from Python,
-the others from compiled code only. The reference implementation in `tcs.kernel.verification`
+the others from compiled code only. The reference implementation in `tests/reference`
 deliberately repeats these computations, to check them.
 """
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED
-from tcs.kernel.verification import reference_pairs
-from tcs.kernel.verification.reference import free_joint
 from tests.kernel.arms import drake_arm
 from tests.kernel.shapes import random_arm
+from tests.reference import pairs as reference_pairs
+from tests.reference.kinematics import free_joint
 
 ROUNDING = 2e-6
 """Joints are float32: seven roundings of 1.2e-7 rad move a far corner by up to 1e-6 m."""

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from tcs.kernel.arrays import BOX, CAPSULE, SPHERE, Chain, Shapes
-from tcs.kernel.verification.reference import PlacedShape
+from tests.reference.kinematics import PlacedShape
 
 
 def rotation(rng):

@@ -13,12 +13,12 @@ from tcs.kernel.rows import grid_rows
 from tcs.kernel.scores import BODY_BLOCKED, REACHED, progress_of
 from tcs.kernel.sweep import blocked_grippers, gripper_contacts
 from tcs.kernel.verification.dense import dense_scans
-from tcs.kernel.verification.reference_freedom import free_score, is_served
 from tcs.model.tasks import Freedom
 from tests.kernel.shapes import about
 from tests.kernel.test_freedom import CHAIN
 from tests.kernel.test_six_joints import six_joint_chain
 from tests.kernel.toy import scores_of, toy_grid, toy_scene
+from tests.reference.pairs import free_score, is_served
 
 FIRST = np.array([0, 2, 3, 5])
 """Three goals: of two poses, of one and of two."""

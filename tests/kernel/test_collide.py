@@ -22,7 +22,6 @@ from scipy.optimize import lsq_linear
 
 from tcs.kernel.arrays import BOX, CAPSULE, SPHERE
 from tcs.kernel.collide import closer, move, pack, sphere_is_near, spheres_overlap
-from tcs.kernel.verification.reference import distance
 from tests.kernel.shapes import (
     SHAPE_TYPES,
     about,
@@ -32,6 +31,7 @@ from tests.kernel.shapes import (
     right_angles,
     rotation,
 )
+from tests.reference.kinematics import distance
 
 PAIRS = list(itertools.combinations_with_replacement(SHAPE_TYPES, 2))
 FAR = 20.0

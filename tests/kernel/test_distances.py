@@ -16,16 +16,12 @@ from tcs.kernel.distances import (
 )
 from tcs.kernel.motion.edges import NO_PAIR, certified, posture_contact
 from tcs.kernel.scores import REACHED
-from tcs.kernel.verification.reference_distances import STEP, bounds_at
-from tcs.kernel.verification.reference_motion import (
-    least_excess,
-    point_on_curve,
-    straight_curve,
-)
 from tests.kernel.arms import drake_arm
 from tests.kernel.judge import compare, stratified
 from tests.kernel.motion.toys import prepared, within_limits
 from tests.kernel.toy import scores_of, toy_grid, toy_scene
+from tests.reference.motion import least_excess, point_on_curve, straight_curve
+from tests.reference.pairs import STEP, bounds_at
 
 UPPER, FORE, PALM, FINGER, HEAD = 3, 4, 5, 6, 7
 """Bodies of the toy scene."""

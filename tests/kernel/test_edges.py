@@ -11,8 +11,11 @@ import numpy as np
 import pytest
 
 from tcs.kernel.scores import REACHED, TOO_FAR
-from tcs.kernel.verification import reference_pairs
-from tcs.kernel.verification.constructed import (
+from tcs.kernel.verification.plain_dexterity import isotropy
+from tcs.placement.scoring import load_job
+from tests.chosen import some_of
+from tests.reference import pairs as reference_pairs
+from tests.reference.constructed import (
     ELBOW,
     SHOULDER,
     WRIST,
@@ -20,9 +23,7 @@ from tcs.kernel.verification.constructed import (
     near_singular_goals,
     singular_angles,
 )
-from tcs.kernel.verification.reference import isotropy, jacobian
-from tcs.placement.scoring import load_job
-from tests.chosen import some_of
+from tests.reference.kinematics import jacobian
 
 ROBOTS = ["pr2", "tiago", "iiwa7", "panda"]
 JOINTS = {"shoulder": SHOULDER, "elbow": ELBOW, "wrist": WRIST}

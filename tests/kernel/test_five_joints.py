@@ -20,13 +20,14 @@ from tcs.kernel.six_joints.solutions import six_joint_solutions
 from tcs.kernel.solvers import new_solver
 from tcs.kernel.verification.dense import dense_scan
 from tcs.kernel.verification.newton_solutions import newton_solutions, within
-from tcs.kernel.verification.reference import jacobian, link_poses, measured, prescribed
-from tcs.kernel.verification.reference_freedom import is_served
-from tcs.kernel.verification.reference_pairs import score as reference_score
+from tcs.kernel.verification.plain_dexterity import measured, prescribed
 from tcs.model.tasks import Freedom
 from tests.kernel.judge import stratified
 from tests.kernel.shapes import about, around, random_arm, rotation
 from tests.kernel.toy import scores_of, toy_grid, toy_scene
+from tests.reference.kinematics import jacobian, link_poses
+from tests.reference.pairs import is_served
+from tests.reference.pairs import score as reference_score
 
 AXIS = (0.6, 0.0, 0.8)
 TURN = Freedom(axis=AXIS, rotates=True)

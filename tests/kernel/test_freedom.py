@@ -23,12 +23,12 @@ from tcs.kernel.sweep import blocked_grippers, gripper_contacts
 from tcs.kernel.verification import free_scans
 from tcs.kernel.verification.dense import dense_scans
 from tcs.kernel.verification.free_scans import drawn_poses
-from tcs.kernel.verification.reference import compose, link_poses
-from tcs.kernel.verification.reference_freedom import at_offset, free_score, is_served, offset
 from tcs.model.tasks import Freedom
 from tests.kernel.shapes import about, random_arm, rotation, straight_arm
 from tests.kernel.test_six_joints import six_joint_chain
 from tests.kernel.toy import scores_of, toy_grid, toy_scene
+from tests.reference.kinematics import compose, link_poses
+from tests.reference.pairs import at_offset, free_score, is_served, offset
 
 X = (1.0, 0.0, 0.0)
 FREEDOMS = {

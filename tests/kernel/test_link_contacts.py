@@ -10,10 +10,10 @@ from tcs.kernel.contacts import ARM, BODY, ENVIRONMENT
 from tcs.kernel.kinematics import link_poses
 from tcs.kernel.link_contacts import arm_touches, body_touches, environment_touches
 from tcs.kernel.problem import build_problem
-from tcs.kernel.verification.constructed import random_posture
 from tcs.kernel.workspace import new_workspace, place_group, place_link
 from tests.kernel.judge import chain_of
 from tests.kernel.toy import crowded, toy_scene
+from tests.reference.constructed import random_posture
 
 NONE = -1
 

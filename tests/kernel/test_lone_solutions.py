@@ -9,12 +9,13 @@ from tcs.kernel.arrays import SPHERE, GridArrays, SceneArrays
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import rows_at
 from tcs.kernel.scores import REACHED
-from tcs.kernel.verification import reference_pairs
-from tcs.kernel.verification.constructed import same_branch, score_one, with_goals
-from tcs.kernel.verification.reference import free_joint, isotropy, jacobian, link_poses
+from tcs.kernel.verification.plain_dexterity import isotropy
 from tests.kernel.judge import is_true
 from tests.kernel.shapes import as_shapes, placed, random_joints, straight_arm
 from tests.kernel.toy import arm_shapes
+from tests.reference import pairs as reference_pairs
+from tests.reference.constructed import same_branch, score_one, with_goals
+from tests.reference.kinematics import free_joint, jacobian, link_poses
 
 LIMITS = np.array([2.9, 2.0, 2.9, 2.1, 2.9, 2.1, 3.0])
 FOREARM_ROLL, WRIST, WRIST_ROLL = 4, 5, 6

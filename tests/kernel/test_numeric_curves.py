@@ -19,10 +19,11 @@ from tcs.kernel.numeric.newton import (
 )
 from tcs.kernel.numeric.search import is_within_span
 from tcs.kernel.numeric.solutions import numeric_solutions
-from tcs.kernel.verification import reference
-from tcs.kernel.verification.reference import link_poses
+from tcs.kernel.verification import plain_dexterity
 from tests.kernel.arms import drake_arm
 from tests.kernel.shapes import around, offset_arm, random_joints, straight_arm, turned_by
+from tests.reference import kinematics as reference
+from tests.reference.kinematics import link_poses
 
 
 @pytest.fixture(params=["baxter", *range(5)], ids=str)
@@ -154,7 +155,7 @@ def test_newton_converges_to_the_goal(chain, rng):
 @pytest.mark.parametrize("of", [ISOTROPY, INVERSE_CONDITION], ids=["isotropy", "condition"])
 def test_a_curve_holds_the_tool_still_from_point_to_point(chain, rng, of):
     arm, newton, checked = numeric_arm(chain), new_newton_workspace(), 0
-    exact = reference.isotropy if of == ISOTROPY else reference.inverse_condition
+    exact = plain_dexterity.isotropy if of == ISOTROPY else plain_dexterity.inverse_condition
     for _ in range(5):
         q = random_joints(rng, chain)
         to = pose(chain, q)

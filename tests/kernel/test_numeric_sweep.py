@@ -25,12 +25,13 @@ from tcs.kernel.scores import (
 )
 from tcs.kernel.sweep import _score_rows
 from tcs.kernel.verification.dense import dense_scan
-from tcs.kernel.verification.reference import isotropy, jacobian
+from tcs.kernel.verification.plain_dexterity import isotropy
 from tcs.placement.scoring import load_job
 from tests.kernel.arms import drake_arm
 from tests.kernel.judge import chain_of, is_true
 from tests.kernel.shapes import offset_arm, random_arm
 from tests.kernel.toy import goal_in_base, scores_of, size_of, toy_grid, toy_scene
+from tests.reference.kinematics import jacobian
 
 ROOT = Path(__file__).parents[2]
 

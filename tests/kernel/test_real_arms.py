@@ -8,10 +8,10 @@ import pytest
 from tcs.kernel.analytic.ik import sample_joints, wrist_goal
 from tcs.kernel.analytic.solver import arm_solver
 from tcs.kernel.dexterity.measures import isotropy_at
-from tcs.kernel.verification.reference import free_joint, link_poses, solutions
 from tests.kernel.arms import drake_arm
 from tests.kernel.sampled import slack_and_measure
 from tests.kernel.shapes import around, random_joints
+from tests.reference.kinematics import free_joint, link_poses, solutions
 
 # A dozen products of rotations over an arm of about 1 m.
 EXACT = 1e-12

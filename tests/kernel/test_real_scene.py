@@ -11,14 +11,13 @@ from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import rows_at
 from tcs.kernel.scores import GRIPPER_BLOCKED_BY_ROBOT, REACHED
-from tcs.kernel.verification.constructed import random_posture, score_one, with_goals
-from tcs.kernel.verification.free_postures import posture_contact
 from tcs.kernel.workspace import new_workspace
 from tcs.model.scene import Scene, SceneSpec, lower
 from tcs.placement.scoring import sweep
 from tcs.placement.tables import Reason
 from tests.chosen import some_of
 from tests.kernel.judge import compare, is_true, stratified
+from tests.reference.constructed import posture_contact, random_posture, score_one, with_goals
 
 
 @pytest.fixture(scope="module")

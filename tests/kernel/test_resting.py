@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from tcs.kernel.scores import BODY_BLOCKED
-from tcs.kernel.verification.reference_pairs import placed_scene
 from tests.chosen import some_of
 from tests.kernel.judge import chain_of
 from tests.kernel.shapes import random_joints
 from tests.kernel.toy import scores_of, size_of, toy_grid, toy_scene
+from tests.reference.pairs import placed_scene
 
 
 @pytest.mark.parametrize("seed", some_of(range(6), 0, 1))

@@ -10,10 +10,11 @@ from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import rows_at
 from tcs.kernel.scores import REACHED
 from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan
-from tcs.kernel.verification.reference import jacobian, measured
+from tcs.kernel.verification.plain_dexterity import measured
 from tests.chosen import some_of
 from tests.kernel.judge import chain_of, compare, stratified
 from tests.kernel.toy import scores_of, toy_grid, toy_scene
+from tests.reference.kinematics import jacobian
 
 OTHERS = [measure for measure in MEASURES if measure != "isotropy"]
 

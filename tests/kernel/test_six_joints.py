@@ -23,10 +23,11 @@ from tcs.kernel.six_joints.solutions import (
 )
 from tcs.kernel.verification.dense import dense_scan
 from tcs.kernel.verification.newton_solutions import newton_solutions, within
-from tcs.kernel.verification.reference import jacobian, link_poses, measured
+from tcs.kernel.verification.plain_dexterity import measured
 from tests.kernel.judge import compare, is_true, stratified
 from tests.kernel.shapes import around, random_arm, random_joints, rotation
 from tests.kernel.toy import scores_of, toy_grid, toy_scene
+from tests.reference.kinematics import jacobian, link_poses
 
 CLASSES = ("spherical wrist", "parallel axes", "elimination")
 SCENES = {"spherical wrist": 6, "parallel axes": 10, "elimination": 10}

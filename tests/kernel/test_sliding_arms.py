@@ -12,8 +12,8 @@ from tcs.kernel.problem import with_slides
 from tcs.kernel.six_joints.arm import six_joint_arm
 from tcs.kernel.six_joints.solutions import six_joint_solutions
 from tcs.kernel.verification.newton_solutions import newton_solutions, within
-from tcs.kernel.verification.reference import coupled_pose, jacobian, link_poses
 from tests.kernel.shapes import about, around, rotation
+from tests.reference.kinematics import coupled_pose, jacobian, link_poses
 
 ORDERS = {"slides first": (1, 2, 3), "mixed": (1, 4, 6), "slides last": (4, 5, 6)}
 

@@ -21,14 +21,7 @@ from tcs.kernel.scores import (
     GRIPPER_BLOCKED_BY_ROBOT,
     REACHED,
 )
-from tcs.kernel.verification.reference import (
-    compose,
-    isotropy,
-    jacobian,
-    link_poses,
-    rot_z,
-    shapes_of,
-)
+from tcs.kernel.verification.plain_dexterity import isotropy
 from tcs.placement.tables import Reason
 from tests.chosen import some_of
 from tests.kernel.judge import ROUNDING, chain_of, compare, is_true, stratified
@@ -42,6 +35,7 @@ from tests.kernel.toy import (
     toy_scene,
     with_obstacle,
 )
+from tests.reference.kinematics import compose, jacobian, link_poses, rot_z, shapes_of
 
 ROOT = Path(__file__).parents[2]
 MASKS = ("arm_vs_arm", "arm_vs_body", "arm_vs_environment", "body_vs_environment")

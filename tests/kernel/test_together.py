@@ -4,12 +4,12 @@ import pytest
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import rows_at
 from tcs.kernel.together.arms import TwoArms
-from tcs.kernel.verification.constructed import random_posture
-from tcs.kernel.verification.reference_together import arms_touch, reached_together
 from tcs.model.robots import links_of_arm
 from tcs.placement.scoring.job import load_jobs
 from tests.chosen import some_of
 from tests.environments import write_environment
+from tests.reference.constructed import random_posture
+from tests.reference.pairs import arms_touch, reached_together
 from tests.two_arms import GRID, PAIR, write_pair
 
 

@@ -12,8 +12,8 @@ from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import grid_rows
 from tcs.kernel.scores import Scores
 from tcs.kernel.sweep import gripper_contacts, score_rows
-from tcs.kernel.verification.reference import compose, inverse, link_poses, rot_z
 from tests.kernel.shapes import as_shapes, placed, random_joints, rotation
+from tests.reference.kinematics import compose, inverse, link_poses, rot_z
 
 QUARTERS = np.array([0.0, 0.5, 1.0, 1.5]) * np.pi
 

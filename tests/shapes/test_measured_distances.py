@@ -14,7 +14,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 import tcs.kernel.distances as kernel_distances
-import tcs.kernel.verification.reference_distances as reference_distances
+import tests.reference.pairs as reference_distances
 from tcs.errors import RobotError
 from tcs.model.robots import Primitive, load_robot
 from tcs.model.robots.distances import (

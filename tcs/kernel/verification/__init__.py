@@ -1,5 +1,5 @@
-"""Checks of the kernel: the plain-loop reference implementation and the dense scans.
+"""What `tcs verify` checks results with: dense scans, and dexterity by its definition.
 
 In: the arrays that the kernel reads. Out: the same results, computed slowly and independently.
-Tests, benchmarks and `tcs.placement.scoring.verify` use this package.
+The plain-loop reference of all that the kernel does is in `tests/reference`.
 """

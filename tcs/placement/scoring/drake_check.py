@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
-from tcs.kernel.verification.reference import measured, prescribed
+from tcs.kernel.verification.plain_dexterity import measured, prescribed
 from tcs.model.scene import (
     Contact,
     NeighbourList,

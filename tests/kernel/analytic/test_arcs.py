@@ -17,11 +17,11 @@ from tcs.kernel.analytic.arcs import (
 from tcs.kernel.analytic.ik import wrist_goal
 from tcs.kernel.analytic.scratch import MAX_WINDOWS
 from tcs.kernel.analytic.solver import arm_solver
-from tcs.kernel.verification import reference_candidates
-from tcs.kernel.verification.reference import free_joint, link_poses
 from tests.kernel.arms import drake_arm
 from tests.kernel.sampled import slack_and_measure
 from tests.kernel.shapes import random_arm, random_joints, rotation
+from tests.reference import candidates as reference_candidates
+from tests.reference.kinematics import free_joint, link_poses
 
 DENSE = 2000
 ENDS = 2 * INSET

@@ -7,11 +7,12 @@ import pytest
 
 from tcs.kernel.analytic.ik import sample_joints, within, wrist_goal
 from tcs.kernel.analytic.solver import arm_solver
-from tcs.kernel.verification.reference import free_joint, isotropy, jacobian, link_poses, solutions
+from tcs.kernel.verification.plain_dexterity import isotropy
 from tests.chosen import some_of
 from tests.kernel.arms import drake_arm
 from tests.kernel.sampled import slack_and_measure
 from tests.kernel.shapes import around, random_arm, random_joints, rotation
+from tests.reference.kinematics import free_joint, jacobian, link_poses, solutions
 
 WRISTS, SHOULDERS = range(12), [f"shoulder {i}" for i in range(12)]
 ARMS = [

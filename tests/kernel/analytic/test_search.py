@@ -10,10 +10,10 @@ from tcs.kernel.analytic.ik import wrist_goal
 from tcs.kernel.analytic.scratch import new_search
 from tcs.kernel.analytic.search import find_candidates
 from tcs.kernel.analytic.solver import arm_solver
-from tcs.kernel.verification import reference_candidates
-from tcs.kernel.verification.reference import free_joint
 from tests.kernel.judge import chain_of
 from tests.kernel.toy import goal_in_base, size_of, toy_grid, toy_scene
+from tests.reference import candidates as reference_candidates
+from tests.reference.kinematics import free_joint
 
 # Seed of arm and environment, configuration, goal. Rounding decides how many samples an arc gets
 # (103, 151), whether its outermost sample is feasible (119), whether two arcs are one (the rest).

@@ -16,9 +16,9 @@ from tcs.kernel.analytic.solver import (
     cos_range,
     reversed_chain,
 )
-from tcs.kernel.verification.reference import compose, elbow, free_joint, link_poses, rot_z
 from tests.kernel.arms import drake_arm
 from tests.kernel.shapes import random_arm, straight_arm
+from tests.reference.kinematics import compose, elbow, free_joint, link_poses, rot_z
 
 ends = st.tuples(st.floats(-8.0, 8.0), st.floats(-8.0, 8.0)).map(sorted)
 

@@ -12,12 +12,12 @@ from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import grid_rows, rows_at
 from tcs.kernel.scores import APPROACH_BLOCKED, APPROACH_LIMITS, REACHED
-from tcs.kernel.verification.reference import link_poses
-from tcs.kernel.verification.reference_motion import least_excess
-from tcs.kernel.verification.reference_pairs import placed_scene
 from tests.kernel.arms import drake_arm
 from tests.kernel.shapes import placed
 from tests.kernel.toy import goal_in_base, scores_of, toy_grid, toy_scene, with_obstacle
+from tests.reference.kinematics import link_poses
+from tests.reference.motion import least_excess
+from tests.reference.pairs import placed_scene
 
 GRID = toy_grid()
 BACK = np.array([-0.1, 0.0, 0.0])

@@ -20,15 +20,15 @@ from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import grid_rows, rows_at
 from tcs.kernel.scores import APPROACH_BLOCKED, APPROACH_LIMITS, REACHED
 from tcs.kernel.verification.newton_solutions import newton_solutions, within
-from tcs.kernel.verification.reference import jacobian, link_poses
-from tcs.kernel.verification.reference_motion import least_excess
-from tcs.kernel.verification.reference_pairs import placed_scene
 from tests.chosen import some_of
 from tests.kernel.arms import drake_arm
 from tests.kernel.test_five_joints import AXIS, TURN, five_joint_chain
 from tests.kernel.test_six_joints import six_joint_chain
 from tests.kernel.test_sliding_arms import sliding_chain
 from tests.kernel.toy import goal_in_base, scores_of, toy_grid, toy_scene
+from tests.reference.kinematics import jacobian, link_poses
+from tests.reference.motion import least_excess
+from tests.reference.pairs import placed_scene
 
 GRID = toy_grid(states=1)
 BACK = np.array([-0.1, 0.0, 0.0])

@@ -9,9 +9,9 @@ from tcs.kernel.collide import CENTRE
 from tcs.kernel.motion.idle import needed_pairs
 from tcs.kernel.motion.scene import torso_scene
 from tcs.kernel.problem import build_problem
-from tcs.kernel.verification.reference import link_poses
 from tests.kernel.arms import drake_arm
 from tests.kernel.toy import toy_scene
+from tests.reference.kinematics import link_poses
 
 
 def needed_at(problem, torso):

@@ -17,10 +17,11 @@ from tcs.kernel.dexterity.measures import (
     tridiagonalise,
 )
 from tcs.kernel.problem import build_problem
-from tcs.kernel.verification import reference
+from tcs.kernel.verification import plain_dexterity
 from tests.kernel.arms import drake_arm
 from tests.kernel.shapes import random_joints, rotation, turned_by
 from tests.kernel.toy import toy_scene
+from tests.reference import kinematics as reference
 
 LOWER, UPPER = np.linspace(-2.0, -1.0, 7), np.linspace(1.5, 2.5, 7)
 STEP = 1e-6
@@ -95,7 +96,7 @@ def test_every_measure_agrees_with_the_reference(lowered, rng, arm, measure):
     for _ in range(30):
         q = random_joints(rng, chain)
         J = reference.jacobian(chain, q)
-        exact = reference.measured(J, q, chain.lower, chain.upper, measure)
+        exact = plain_dexterity.measured(J, q, chain.lower, chain.upper, measure)
         assert measure_at(problem, q) == pytest.approx(exact, abs=1e-10)
         assert 0.0 <= exact <= 1.0
 
@@ -156,7 +157,7 @@ def test_a_singular_jacobian_has_inverse_condition_zero(lowered, rng):
     problem = build_problem(lowered.arrays, "inverse-condition")
     # The root of rounding, 1e-15: singular values come from J J^T.
     assert measure_at(problem, np.zeros(7)) < 1e-7
-    assert reference.inverse_condition(reference.jacobian(chain, np.zeros(7))) < 1e-15
+    assert plain_dexterity.inverse_condition(reference.jacobian(chain, np.zeros(7))) < 1e-15
     for _ in range(20):
         J = rng.normal(size=(6, 5)) @ rng.normal(size=(5, 7))
         assert inverse_condition(J) < 1e-7

@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 from tcs.kernel.dexterity.measures import isotropy_at, rounded_inward
 from tcs.kernel.kinematics import jacobian
-from tcs.kernel.verification import reference
+from tcs.kernel.verification import plain_dexterity
 from tests.kernel.arms import drake_arm
 from tests.kernel.shapes import random_arm, random_joints, turned_by
+from tests.reference import kinematics as reference
 
 STEP = 1e-6
 
@@ -75,7 +76,7 @@ def test_jacobian_agrees_with_drake(scene, lowered, full_grid, rng):
 def test_isotropy_is_the_equation(chain, rng):
     for _ in range(50):
         q = random_joints(rng, chain)
-        exact = reference.isotropy(reference.jacobian(chain, q))
+        exact = plain_dexterity.isotropy(reference.jacobian(chain, q))
         assert 0.0 <= exact <= 1.0
         # Determinants good to 1e-15 of the largest term; the sixth root of that is 3e-3 at zero.
         expected = pytest.approx(exact, abs=1e-10 if exact > 0.1 else 3e-3)
@@ -97,7 +98,7 @@ def test_isotropy_is_zero_where_the_arm_is_singular(lowered):
     chain = lowered.arrays.chain
     # Elbow and wrist straight and the shoulder level: axes 1 .. 7 leave a direction out.
     assert isotropy_at(chain.R, chain.p, np.zeros(7)) < 3e-3
-    assert reference.isotropy(reference.jacobian(chain, np.zeros(7))) < 3e-3
+    assert plain_dexterity.isotropy(reference.jacobian(chain, np.zeros(7))) < 3e-3
 
 
 @given(

@@ -6,19 +6,19 @@ import pytest
 
 from tcs.kernel.arrays import BOX
 from tcs.kernel.motion.edges import NO_PAIR, certified, posture_contact
-from tcs.kernel.verification.clutter import arm_base
-from tcs.kernel.verification.reference import link_poses
-from tcs.kernel.verification.reference_motion import (
+from tests.kernel.arms import drake_arm
+from tests.kernel.motion.toys import HERE, SWING, bare, prepared, toy, within_limits
+from tests.kernel.shapes import placed
+from tests.kernel.toy import along, toy_grid, with_obstacle
+from tests.reference.constructed import arm_base
+from tests.reference.kinematics import link_poses
+from tests.reference.motion import (
     is_free_along,
     least_excess,
     point_on_curve,
     samples_along,
     straight_curve,
 )
-from tests.kernel.arms import drake_arm
-from tests.kernel.motion.toys import HERE, SWING, bare, prepared, toy, within_limits
-from tests.kernel.shapes import placed
-from tests.kernel.toy import along, toy_grid, with_obstacle
 
 NEAR = 2e-5
 """Clearance beyond the required one below which the certified check may refuse [m]: twice the

@@ -12,17 +12,13 @@ from tcs.kernel.motion.scene import FRAMES, motion_scene, new_motion_workspace
 from tcs.kernel.motion.straight import DONE, OFF_LINE, new_straight_workspace, straight_motion
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import rows_at
-from tcs.kernel.verification.reference import link_poses
-from tcs.kernel.verification.reference_motion import (
-    is_free_along,
-    least_excess,
-    straight_curve,
-)
 from tests.kernel.motion.test_planes import judge
 from tests.kernel.motion.toys import HERE, prepared, within_limits
 from tests.kernel.test_five_joints import AXIS, TURN, five_joint_chain
 from tests.kernel.test_sliding_arms import ORDERS, sliding_chain
 from tests.kernel.toy import toy_grid, toy_scene
+from tests.reference.kinematics import link_poses
+from tests.reference.motion import is_free_along, least_excess, straight_curve
 
 COUPLED = (0.5, 0.25)
 """Fractions of the motion of the second prismatic joint that links behind it make."""

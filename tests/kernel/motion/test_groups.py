@@ -21,13 +21,13 @@ from tcs.kernel.motion.scene import (
 )
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import rows_at
-from tcs.kernel.verification.reference_motion import least_excess, straight_curve
-from tcs.kernel.verification.reference_pairs import placed_scene
 from tests.kernel.arms import drake_arm
 from tests.kernel.motion.test_planes import corners, place
 from tests.kernel.motion.toys import HERE, within_limits
 from tests.kernel.shapes import rotation
 from tests.kernel.toy import toy_grid, toy_scene
+from tests.reference.motion import least_excess, straight_curve
+from tests.reference.pairs import placed_scene
 
 COPIES = 8
 

@@ -12,12 +12,12 @@ from tcs.kernel.motion.idle import MOST_BETWEEN, needed_pairs
 from tcs.kernel.motion.scene import motion_scene, new_motion_workspace, with_pairs
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import rows_at
-from tcs.kernel.verification.clutter import arm_base
-from tcs.kernel.verification.reference import link_poses
 from tests.kernel.arms import drake_arm
 from tests.kernel.motion.toys import HERE, within_limits
 from tests.kernel.shapes import placed
 from tests.kernel.toy import toy_grid, toy_scene, with_obstacle
+from tests.reference.constructed import arm_base
+from tests.reference.kinematics import link_poses
 
 OUT = np.array([0.35, 0.0, 0.1])
 """Where the shapes of the first three links are, in their frames [m]."""

@@ -12,12 +12,12 @@ from tcs.kernel.motion.connect import connect
 from tcs.kernel.motion.edges import NO_PAIR, certified, posture_contact
 from tcs.kernel.motion.shortcut import shorten
 from tcs.kernel.motion.trees import new_trees
-from tcs.kernel.verification.clutter import arm_base
-from tcs.kernel.verification.reference_motion import straight_curve
 from tests.kernel.arms import drake_arm
 from tests.kernel.motion.toys import HERE, SWING, bare, prepared, within_limits
 from tests.kernel.shapes import placed
 from tests.kernel.toy import toy_grid, with_obstacle
+from tests.reference.constructed import arm_base
+from tests.reference.motion import straight_curve
 
 
 @pytest.fixture(scope="module")

@@ -10,11 +10,11 @@ import pytest
 from tcs.kernel.motion.connect import connect
 from tcs.kernel.motion.edges import NO_PAIR, posture_contact
 from tcs.kernel.motion.trees import new_trees
-from tcs.kernel.verification.reference_motion import is_free_along, least_excess, straight_curve
 from tests.chosen import some_of
 from tests.kernel.arms import drake_arm
 from tests.kernel.motion.plain_planner import plain_path
 from tests.kernel.motion.toys import toy, within_limits
+from tests.reference.motion import is_free_along, least_excess, straight_curve
 
 
 @pytest.fixture(scope="module")

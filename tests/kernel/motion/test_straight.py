@@ -19,12 +19,12 @@ from tcs.kernel.motion.straight import (
     straight_motion,
 )
 from tcs.kernel.problem import build_problem
-from tcs.kernel.verification.clutter import arm_base
-from tcs.kernel.verification.reference import link_poses
 from tests.kernel.arms import drake_arm
 from tests.kernel.motion.toys import HERE, SWING, bare, prepared, within_limits
 from tests.kernel.shapes import placed
 from tests.kernel.toy import toy_grid, with_obstacle
+from tests.reference.constructed import arm_base
+from tests.reference.kinematics import link_poses
 
 UNLIMITED = np.full(7, np.inf)
 

@@ -20,12 +20,12 @@ from tcs.kernel.motion.straight import (
     take_pieces,
 )
 from tcs.kernel.motion.tool_line import take_line
-from tcs.kernel.verification.reference import link_poses
 from tcs.kernel.views import unowned
 from tests.chosen import some_of
 from tests.kernel.arms import drake_arm
 from tests.kernel.motion.test_planes import corners
 from tests.kernel.motion.toys import bare, prepared, within_limits
+from tests.reference.kinematics import link_poses
 
 FASTEST = np.full(7, np.inf)
 LENGTH = 0.1

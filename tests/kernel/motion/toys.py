@@ -8,8 +8,8 @@ from tcs.kernel.motion.idle import without_idle_pairs
 from tcs.kernel.motion.scene import motion_scene, new_motion_workspace
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import rows_at
-from tcs.kernel.verification.reference_pairs import placed_scene
 from tests.kernel.toy import toy_grid, toy_scene
+from tests.reference.pairs import placed_scene
 
 HERE = 40
 """A configuration in the middle of the grid, on the lower torso level."""

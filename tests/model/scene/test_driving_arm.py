@@ -8,13 +8,13 @@ import yaml
 
 from tcs.errors import RobotError, UnknownNameError
 from tcs.files.paths import data_folder
-from tcs.kernel.verification.reference import coupled_pose, jacobian, link_poses
 from tcs.model.robots import load_robot
 from tcs.model.scene import Scene, SceneSpec, arm_chain, load_environment
 from tcs.model.scene.contacts import Group
 from tcs.output.report.score.scene_solids import base_outline
 from tcs.placement.scoring import score, verify
 from tests.environments import write_environment
+from tests.reference.kinematics import coupled_pose, jacobian, link_poses
 
 SEGMENTS = ("link_arm_l3", "link_arm_l2", "link_arm_l1", "link_arm_l0")
 

@@ -13,14 +13,13 @@ from tcs.kernel.motion.edges import posture_contact as motion_contact
 from tcs.kernel.motion.scene import motion_scene, new_motion_workspace
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import rows_at
-from tcs.kernel.verification.constructed import with_goals
-from tcs.kernel.verification.free_postures import posture_contact
 from tcs.kernel.workspace import new_workspace
 from tcs.model.robots import load_robot
 from tcs.model.robots.distances import tables_in_force
 from tcs.model.scene import Scene, SceneSpec, lower
 from tcs.model.scene.neighbours import NeighbourList
 from tests.chosen import some_of
+from tests.reference.constructed import posture_contact, with_goals
 
 
 @pytest.fixture(scope="module", params=some_of(["panda", "ur5"], "ur5"))

@@ -20,7 +20,7 @@ from tcs.kernel.analytic.search import (
     PEAK_REFINEMENTS,
 )
 from tcs.kernel.arrays import Chain, FloatArray
-from tcs.kernel.verification.reference import (
+from tests.reference.kinematics import (
     Pose,
     Solution,
     compose,

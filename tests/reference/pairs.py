@@ -1,4 +1,6 @@
-"""Reference implementation of the score of one configuration at one goal, built on `reference`.
+"""Reference implementation of the score of one configuration at one goal, built on `kinematics`.
+
+With it: goals with freedom, goals of two arms at once, and tables of distances.
 
 It samples the same angles of the free joint as the kernel, so that results can be compared one by
 one; where none is free, it halves the intervals in which joints move far, by a rule of its own.
@@ -15,12 +17,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from tcs.kernel.analytic.pairs import REFINE_SAMPLES, REFINEMENTS
-from tcs.kernel.arrays import BoolArray, FloatArray, GridArrays, SceneArrays
+from tcs.kernel.arrays import BodyDistances, BoolArray, FloatArray, GridArrays, SceneArrays
 from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.kernel.five_joints.turned import turned_chain
-from tcs.kernel.freedom.forms import AXIS
+from tcs.kernel.freedom.forms import AXIS, COLUMNS, FOLD, HALF, ROTATES, TILT
+from tcs.kernel.freedom.goals import FreeGoals
 from tcs.kernel.scores import (
     ARM_BLOCKED,
     BODY_BLOCKED,
@@ -31,7 +35,9 @@ from tcs.kernel.scores import (
     TOO_FAR,
 )
 from tcs.kernel.verification.newton_solutions import newton_solutions, within
-from tcs.kernel.verification.reference import (
+from tcs.kernel.verification.plain_dexterity import measured, prescribed
+from tests.reference.candidates import Candidate, elbow_arcs, fast_candidates, find_candidates
+from tests.reference.kinematics import (
     PlacedShape,
     Pose,
     compose,
@@ -41,20 +47,18 @@ from tcs.kernel.verification.reference import (
     inverse,
     jacobian,
     link_poses,
-    measured,
-    prescribed,
     rot_z,
     separation,
     shapes_of,
     solutions,
 )
-from tcs.kernel.verification.reference_candidates import (
-    Candidate,
-    elbow_arcs,
-    fast_candidates,
-    find_candidates,
-)
-from tcs.kernel.verification.reference_distances import bounds_at
+
+STEP = 4e-5
+"""Distance that one step of a corner stands for [m]."""
+MOST = 255 * STEP
+"""Greatest distance of a corner [m]."""
+AT_LIMIT = 1e-12
+"""Rounding of the slack of an angle that is tried at its limit."""
 
 
 @dataclass(frozen=True)
@@ -343,3 +347,215 @@ def climb(placed: PlacedScene, best: Candidate, value: Callable[[Candidate], flo
         best = next((c for c in better if not placed.arm_touches(c.q)), best)
         step = fine
     return best
+
+
+def bounds_at(distances: BodyDistances, q: FloatArray) -> dict[frozenset[int], float]:
+    """Return lower bounds of the distance of bodies of the robot at joint angles q [m].
+
+    Args:
+        distances: The tables.
+        q: Joint angles [rad], shape (7,).
+
+    Returns:
+        By pair of indices of bodies, for the pairs that have a table; -1 where nothing is known.
+    """
+    found: dict[frozenset[int], float] = {}
+    begin = 0
+    for pair, joints, counts, reach in zip(
+        distances.body, distances.joint, distances.size, distances.reach, strict=True
+    ):
+        rows, columns = (int(count) for count in counts)
+        corners = distances.corners[begin : begin + rows * columns].reshape(rows, columns)
+        begin += rows * columns
+        cell, way, lost = [0, 0], [0.0, 0.0], 0.0
+        for m, (joint, count, per_radian) in enumerate(
+            zip(joints, (rows, columns), reach, strict=True)
+        ):
+            width = 2.0 * math.pi / count
+            angle = float(q[joint])
+            angle -= 2.0 * math.pi * math.floor(angle / (2.0 * math.pi))
+            cell[m] = min(math.floor(angle / width), count - 1)
+            before = angle - cell[m] * width
+            after = width - before
+            # Half the greatest curvature of a squared distance times the way to either end.
+            lost += float(per_radian) * (float(per_radian) + MOST) * before * after
+            way[m] = before / width
+        total = 0.0
+        for i in range(2):
+            for j in range(2):
+                corner = corners[(cell[0] + i) % rows, (cell[1] + j) % columns]
+                share = (way[0] if i else 1.0 - way[0]) * (way[1] if j else 1.0 - way[1])
+                total += share * (int(corner) * STEP) ** 2
+        bound = math.sqrt(total - lost) if total > lost else -1.0
+        found[frozenset(int(body) for body in pair)] = bound
+    return found
+
+
+def offset(form: FloatArray, u: FloatArray) -> Pose:
+    """Return X_GT of the parameters u of a freedom."""
+    tilt = u[1] * form[9:12] + u[2] * form[12:15]
+    about = u[0] * form[AXIS : AXIS + 3]
+    R = Rotation.from_rotvec(tilt) * Rotation.from_rotvec(about)
+    return R.as_matrix(), np.array(u[3:6])
+
+
+def free_score(
+    scene: SceneArrays,
+    grid: GridArrays,
+    h: int,
+    goal: int,
+    free: FreeGoals,
+    measure: str = DEFAULT_MEASURE,
+) -> Verdict:
+    """Return the best verdict over the samples of the poses of a goal, without refinement.
+
+    If no sample reaches the goal, the verdict is that of the last sample.
+    """
+    best = None
+    posed = []
+    for pose in scene.poses_of(goal):
+        tools = [(np.eye(3), np.zeros(3))]
+        if free.first.size:
+            tools = [offset(free.form[pose], u) for u in free.samples(pose)]
+        posed += [(at_offset(scene, pose, tool), pose) for tool in tools]
+    for single, pose in posed:
+        verdict = score(single, grid, h, pose, measure)
+        is_better = verdict.reason == REACHED and (
+            best is None or best.reason != REACHED or verdict.dexterity > best.dexterity
+        )
+        if best is None or is_better:
+            best = verdict
+    assert best is not None
+    return best
+
+
+def at_offset(scene: SceneArrays, goal: int, X_GT: Pose) -> SceneArrays:
+    """Return the scene whose goals are all poses, one of them moved by X_GT, and nothing free.
+
+    An arm of five joints keeps the freedom, of which it needs the rotation.
+    """
+    R, p = scene.goal_R.copy(), scene.goal_p.copy()
+    for state in range(len(R)):
+        R[state, goal], p[state, goal] = compose((R[state, goal], p[state, goal]), X_GT)
+    freedom = scene.freedom if scene.chain.joints == 5 else scene.freedom[:0]
+    return scene._replace(goal_R=R, goal_p=p, freedom=freedom, first_pose=scene.first_pose[:0])
+
+
+def is_served(scene: SceneArrays, grid: GridArrays, h: int, goal: int, q: FloatArray) -> bool:
+    """Return whether the tool at joint angles q is at a pose that serves a goal, touching nothing.
+
+    Joint angles are float32: the tolerances are those of `reference_pairs.confirms`.
+    """
+    return any(_is_served_at(scene, grid, h, pose, q) for pose in scene.poses_of(goal))
+
+
+def _is_served_at(scene: SceneArrays, grid: GridArrays, h: int, goal: int, q: FloatArray) -> bool:
+    """Return what `is_served` does, for one pose."""
+    placed, blocked = placed_scene(scene, grid, h, goal)
+    X_AT = link_poses(scene.chain, q)[-1]
+    R, p = compose(inverse(placed.X_AG), X_AT)
+    form = scene.freedom[goal].copy() if len(scene.freedom) else np.zeros(COLUMNS)
+    if not np.any(form[AXIS : AXIS + 3]):
+        # Nothing is free, about any axis.
+        form[AXIS] = 1.0
+    at_goal = bool(np.all(np.abs(p) <= form[HALF : HALF + 3] + 2e-6))
+    if form[TILT] < math.pi or not form[ROTATES]:
+        axis = form[AXIS : AXIS + 3]
+        tilted = R @ axis
+        angle = math.acos(min(max(float(axis @ tilted), -1.0), 1.0))
+        # The cosine of a small angle loses half of the digits.
+        at_goal = at_goal and angle <= form[TILT] + 5e-4
+        if not form[ROTATES]:
+            # R with its tilt taken back is a rotation about the axis by one of the angles.
+            normal = np.cross(axis, tilted)
+            length = float(np.linalg.norm(normal))
+            back = Rotation.from_rotvec(-angle * normal / length if length > 0 else np.zeros(3))
+            left = (back * Rotation.from_matrix(R)).as_rotvec()
+            turn = 2.0 * math.pi / max(float(form[FOLD]), 1.0)
+            at_goal = at_goal and abs(math.remainder(float(left @ axis), turn)) <= 1e-5
+    placed.X_AG = X_AT
+    limits = bool(np.all((q >= scene.chain.lower) & (q <= scene.chain.upper)))
+    gripper = placed.gripper_touches(with_body=False) or placed.gripper_touches(with_body=True)
+    return at_goal and limits and not (blocked or gripper or placed.arm_touches(q))
+
+
+def arm_in_base(scene: SceneArrays, torso: int, q: FloatArray) -> list[PlacedShape]:
+    """Return the shapes of an arm in the base frame B, at joint angles q [rad]."""
+    X_BA = scene.arm_base_R[torso], scene.arm_base_p[torso]
+    poses = link_poses(scene.chain, q)
+    return [
+        shape.moved(compose(X_BA, coupled_pose(scene.chain, q, poses, int(frame))))
+        for shape, frame in zip(shapes_of(scene.arm, 0), scene.arm.frame, strict=True)
+    ]
+
+
+def arms_touch(
+    scenes: tuple[SceneArrays, SceneArrays], torso: int, q: FloatArray, q_other: FloatArray
+) -> tuple[bool, float]:
+    """Return whether two arms touch, and by how much none of the compared shapes is a tie [m].
+
+    Args:
+        scenes: The scene of each arm.
+        torso: The torso level.
+        q: Joints of the first [rad], shape (7,).
+        q_other: Joints of the second [rad], shape (7,).
+    """
+    first, second = scenes
+    shapes, others = arm_in_base(first, torso, q), arm_in_base(second, torso, q_other)
+    placed = PlacedScene(first, [], [], (np.eye(3), np.zeros(3)))
+    every = np.ones((len(shapes), len(others)), np.bool_)
+    margin = max(first.self_margin, second.self_margin)
+    return placed.any_touch(shapes, others, every, margin), placed.clearance
+
+
+def free_postures(
+    scene: SceneArrays, grid: GridArrays, h: int, goal: int, angles: FloatArray
+) -> list[FloatArray]:
+    """Return the solutions of an arm by itself that touch nothing.
+
+    Args:
+        scene: The scene, without the other arm.
+        grid: The configurations.
+        h: Number of the configuration.
+        goal: Number of the goal.
+        angles: Angles of the free joint to try [rad].
+    """
+    placed, blocked = placed_scene(scene, grid, h, goal)
+    if blocked or placed.gripper_touches(with_body=False) or placed.gripper_touches(with_body=True):
+        return []
+    found = []
+    for angle in angles.tolist():
+        for solution in solutions(scene.chain, placed.X_AG, angle).values():
+            if solution.slack >= -AT_LIMIT and not placed.arm_touches(solution.q):
+                found.append(solution.q)
+    return found
+
+
+def reached_together(
+    scenes: tuple[SceneArrays, SceneArrays],
+    grid: GridArrays,
+    h: int,
+    goals: tuple[int, int],
+    samples: int,
+) -> bool:
+    """Return whether both arms reach their goals in postures in which they do not touch.
+
+    Args:
+        scenes: The scene of each arm, without the other.
+        grid: The configurations.
+        h: Number of the configuration.
+        goals: Number of the goal of each arm.
+        samples: Number of angles of each free joint that are tried.
+    """
+    torso = h % grid.torso_levels
+    postures = []
+    for scene, goal in zip(scenes, goals, strict=True):
+        joint = free_joint(scene.chain)
+        low, high = scene.chain.lower[joint], scene.chain.upper[joint]
+        limited = bool(np.isfinite(low))
+        first, last = (low, high) if limited else (-math.pi, math.pi)
+        angles = np.linspace(first, last, samples, endpoint=limited)
+        postures.append(free_postures(scene, grid, h, goal, angles))
+    return any(
+        not arms_touch(scenes, torso, q, other)[0] for q in postures[0] for other in postures[1]
+    )

@@ -12,31 +12,52 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tcs.kernel.arrays import SPHERE, Chain, FloatArray, GridArrays, SceneArrays
-from tcs.kernel.contacts import NO_CONTACT
+from tcs.kernel.arrays import (
+    BOX,
+    CAPSULE,
+    SPHERE,
+    Chain,
+    FloatArray,
+    GridArrays,
+    SceneArrays,
+    Shapes,
+)
+from tcs.kernel.base_pose import environment_in_arm_base, goal_in_arm_base, place_base
+from tcs.kernel.cache import jit
+from tcs.kernel.contacts import (
+    BASE_FIXED,
+    NO_CONTACT,
+    arm_contact,
+    base_contact,
+    gripper_body_contact,
+    gripper_environment_contact,
+    upper_contact,
+)
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.rows import Rows, rows_at
 from tcs.kernel.scores import Scores, new_scores
 from tcs.kernel.sweep import gripper_contacts, score_rows
-from tcs.kernel.verification.clutter import arm_base, cluttered, with_obstacle
-from tcs.kernel.verification.free_postures import base_is_free, posture_contact
-from tcs.kernel.verification.reference import (
+from tcs.kernel.views import unowned
+from tcs.kernel.workspace import Workspace, new_workspace
+from tests.reference.kinematics import (
     Pose,
     compose,
     distance,
     elbow,
     free_joint,
     link_poses,
+    rot_z,
     shapes_of,
     solutions,
 )
-from tcs.kernel.workspace import new_workspace
 
 SHOULDER, ELBOW, WRIST = 1, 3, 5
 """Indices of the joints at some angles of which the arm is singular, or its closed form is."""
 MARGIN_LEFT = 1e-5
 """How much farther apart than needed shapes are at the posture that makes a goal [m]: stored joints
 are float32, which moves a far corner by 1e-6 m."""
+CLUTTER = 10
+"""Number of shapes added within an arm's length of the arm base."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,3 +279,102 @@ def between_contacts(
     if not len(free_postures(tight, grid, h, q[None])):
         return None
     return Constructed(with_goals(tight, grid, h, q[None]), grid, h, q[None])
+
+
+def cluttered(
+    rng: np.random.Generator, scene: SceneArrays, grid: GridArrays, number: int = CLUTTER
+) -> tuple[SceneArrays, int]:
+    """Return the scene with shapes added about one random configuration, whose base stays free."""
+    problem = build_problem(scene)
+    while True:
+        h = int(rng.integers(grid.size))
+        row = rows_at(grid, [h])
+        if not base_is_free(problem, new_workspace(problem), row):
+            continue
+        at = arm_base(scene, grid, h)[1]
+        added = scene
+        for k in range(number):
+            more = with_obstacle(added, *random_shape(rng, at, k))
+            crowded = build_problem(more)
+            if base_is_free(crowded, new_workspace(crowded), row):
+                added = more
+        return added, h
+
+
+def random_shape(
+    rng: np.random.Generator, centre: FloatArray, k: int
+) -> tuple[int, FloatArray, FloatArray, FloatArray]:
+    """Return type, size [m], orientation and position [m] of a shape within 0.9 m of a point."""
+    shape_type = (BOX, CAPSULE, SPHERE)[k % 3]
+    size = rng.uniform(0.03, 0.12, 3)
+    direction = rng.normal(size=3)
+    p = centre + direction / np.linalg.norm(direction) * rng.uniform(0.3, 0.9)
+    axes = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    return shape_type, size, axes * np.sign(np.linalg.det(axes)), p
+
+
+def with_obstacle(
+    scene: SceneArrays, shape_type: int, size: FloatArray, R: FloatArray, p: FloatArray
+) -> SceneArrays:
+    """Return the scene with one more shape in the environment, checked against everything."""
+    old = scene.environment
+    states = len(old.p)
+    size = size * {SPHERE: [1, 0, 0], CAPSULE: [1, 1, 0], BOX: [1, 1, 1]}[shape_type]
+    environment = Shapes(
+        type=np.append(old.type, np.int8(shape_type)),
+        size=np.concatenate([old.size, size[None]]),
+        pad=np.append(old.pad, 0.0),
+        body=np.append(old.body, old.body.max(initial=0)),
+        frame=np.append(old.frame, np.int8(0)),
+        R=np.concatenate([old.R, np.repeat(R[None, None], states, axis=0)], axis=1),
+        p=np.concatenate([old.p, np.repeat(p[None, None], states, axis=0)], axis=1),
+    )
+
+    def more(mask: np.ndarray) -> np.ndarray:
+        return np.concatenate([mask, np.ones((len(mask), 1), bool)], axis=1)
+
+    return scene._replace(
+        environment=environment,
+        arm_vs_environment=more(scene.arm_vs_environment),
+        body_vs_environment=more(scene.body_vs_environment),
+    )
+
+
+def arm_base(scene: SceneArrays, grid: GridArrays, h: int) -> Pose:
+    """Return X_WA at configuration h."""
+    _, x, y, yaw, torso = (int(i) for i in np.unravel_index(h, grid.shape))
+    X_WB = rot_z(grid.base_yaw[yaw]), np.array([grid.base_x[x], grid.base_y[y], 0.0])
+    return compose(X_WB, (scene.arm_base_R[torso], scene.arm_base_p[torso]))
+
+
+@jit
+def base_is_free(owned_problem: Problem, owned_work: Workspace, owned_row: Rows) -> bool:
+    """Return whether the robot at rest touches nothing at a configuration."""
+    problem, work, row = unowned(owned_problem), unowned(owned_work), unowned(owned_row)
+    torso = row.torso[0]
+    place_base(problem, work, row, 0)
+    return (
+        base_contact(problem, work, BASE_FIXED, BASE_FIXED) == NO_CONTACT
+        and upper_contact(problem, work, torso) == NO_CONTACT
+    )
+
+
+@jit
+def posture_contact(
+    owned_problem: Problem, owned_work: Workspace, owned_row: Rows, goal: int, q: FloatArray
+) -> int:
+    """Return a contact of arm or gripper at joint angles q that hold the tool at a goal."""
+    problem, work, row = unowned(owned_problem), unowned(owned_work), unowned(owned_row)
+    state, torso = row.state[0], row.torso[0]
+    place_base(problem, work, row, 0)
+    code = gripper_environment_contact(problem, work, state, goal)
+    if code != NO_CONTACT:
+        return code
+    goal_in_arm_base(problem, work, state, torso, goal)
+    body_A = problem.body_A[torso]
+    code = gripper_body_contact(problem, work, body_A)
+    if code != NO_CONTACT:
+        return code
+    environment_in_arm_base(problem, work, torso)
+    work.last[0] = -1
+    return arm_contact(problem, work, body_A, q)

@@ -13,9 +13,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from tcs.kernel.arrays import Chain, FloatArray, Shapes
-from tcs.kernel.verification.reference import PlacedShape, distance
-from tcs.kernel.verification.reference_distances import bounds_at
-from tcs.kernel.verification.reference_pairs import PlacedScene
+from tests.reference.kinematics import PlacedShape, distance
+from tests.reference.pairs import PlacedScene, bounds_at
 
 FAR = 0.05
 """Excess [m] beyond which bounding spheres decide."""
