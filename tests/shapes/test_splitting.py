@@ -63,7 +63,6 @@ def strikes(shapes, boxes):
     return int(np.any([touched(shape, boxes) for shape in shapes], axis=0).sum())
 
 
-@pytest.mark.slow
 def test_fewer_boxes_are_struck_and_the_surface_stays_enclosed(drums, around):
     boxes, others = (cleared(drums, [around], seed) for seed in (0, 1))
     splitting = Splitting("b", [around], drums, boxes)
