@@ -11,10 +11,10 @@ from tcs.kernel.kinematics import link_poses
 from tcs.kernel.link_contacts import arm_touches, body_touches, environment_touches
 from tcs.kernel.problem import build_problem
 from tcs.kernel.workspace import new_workspace, place_group, place_link
+from tests.chosen import some_of
 from tests.kernel.judge import chain_of
 from tests.kernel.toy import crowded, toy_scene
 from tests.reference.constructed import random_posture
-from tests.chosen import some_of
 
 NONE = -1
 
