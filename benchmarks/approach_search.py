@@ -345,7 +345,7 @@ def search(stop: Stop, neighbours: NeighbourList, goal: int, fastest: FloatArray
     R_AG, p_AG = stop.goal_in_arm_base(goal)
     back = -R_AG @ np.asarray(stop.job.task.goals[goal].approach.offset)
     lines = (p_AG, back), (p_AG + back, -back)
-    chain = np.ascontiguousarray(stop.problem.chain_R), np.ascontiguousarray(stop.problem.chain_p)
+    chain = np.ascontiguousarray(stop.problem.chain.R), np.ascontiguousarray(stop.problem.chain.p)
 
     def path_of(solver: ArmSolver, line: tuple[FloatArray, FloatArray], factor: float,
                 are_free: Callable[[FloatArray], BoolArray], how: tuple[float, int, int],

@@ -49,8 +49,8 @@ from tcs.errors import SelectionError
 from tcs.files.writing import make_folder
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import grid_rows
-from tcs.kernel.scores import REACHED, new_scores
-from tcs.kernel.sweep import gripper_contacts, score_rows
+from tcs.kernel.scores import REACHED
+from tcs.kernel.sweep import score as score_rows
 from tcs.model.grid import Axis, Grid
 from tcs.model.random_streams import named_generator
 from tcs.model.robots import load_robot
@@ -291,9 +291,7 @@ class Judge:
         p = np.column_stack([distance + offsets[:, 0], offsets[:, 1], np.full(count, HEIGHT)])
         R = np.tile(grasp_rotation(self.task, 0.0), (count, 1, 1))
         arrays = lowered.arrays._replace(goal_R=R[None], goal_p=p[None])
-        problem = build_problem(arrays)
-        scores = new_scores(1, count)
-        score_rows(problem, gripper_contacts(problem), grid_rows(lowered.grid), scores)
+        scores = score_rows(build_problem(arrays), grid_rows(lowered.grid))
         return int(np.count_nonzero(scores.reason == REACHED))
 
 

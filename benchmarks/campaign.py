@@ -30,7 +30,6 @@ from table import header, parser, record, row, save
 import tcs
 from tcs.files.writing import make_folder, whole_file
 from tcs.kernel.problem import build_problem
-from tcs.kernel.sweep import gripper_contacts
 from tcs.model.people import Scale, draw_bodies, scales_of_people
 from tcs.model.robots import load_robot, robot_names
 from tcs.model.scene import PeopleInScene, load_environment
@@ -40,6 +39,7 @@ from tcs.placement.scoring.dry_run import ScoredSlice, estimate_from, scored_sli
 from tcs.placement.scoring.engines import Part, Work
 from tcs.placement.scoring.job import load_job
 from tcs.placement.scoring.kernel_start import warm_up
+from tcs.placement.scoring.scorer import Scorer
 
 SLICE = 128
 """Configurations of a slice."""
@@ -129,7 +129,7 @@ def estimates(group: Sequence[Job], people: People) -> list[dict[str, Any]]:
         problem = build_problem(arrays, MEASURE)
         if not slices:
             warm_up(problem)
-        work = Work(problem, lowered.grid, gripper_contacts(problem))
+        work = Work(Scorer.of(problem), lowered.grid)
         slices += [scored_slice(work, Part(k, min(k + SLICE, size))) for k in begins]
     if not slices:
         return [{"refused": refusal} for refusal in refused]

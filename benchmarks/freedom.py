@@ -24,8 +24,8 @@ from table import cell, header, parser, row, save
 
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.rows import Rows, rows_at
-from tcs.kernel.scores import BODY_BLOCKED, REACHED, new_scores
-from tcs.kernel.sweep import gripper_contacts, score_rows
+from tcs.kernel.scores import BODY_BLOCKED, REACHED
+from tcs.kernel.sweep import score
 from tcs.kernel.verification.free_scans import at_poses
 from tcs.model.tasks import Freedom, Task, load_task
 from tcs.placement.robustness.statistics import binomial_interval
@@ -118,8 +118,8 @@ def reasons_at(problem: Problem, rows: Rows) -> tuple[NDArray[np.uint8], float]:
     Returns:
         Codes of reasons, shape (n, goals), and the processor time [s].
     """
-    scores, begun = new_scores(rows.state.size, problem.goals), time.process_time()
-    score_rows(problem, gripper_contacts(problem), rows, scores)
+    begun = time.process_time()
+    scores = score(problem, rows)
     return scores.reason, time.process_time() - begun
 
 

@@ -14,8 +14,7 @@ from table import cell, row, spread
 from tcs.kernel.arrays import FloatArray, GridArrays, IntArray
 from tcs.kernel.problem import UNCHECKED, Problem
 from tcs.kernel.rows import grid_rows
-from tcs.kernel.scores import new_scores
-from tcs.kernel.sweep import score_rows
+from tcs.kernel.sweep import score
 from tcs.placement.scoring import sweep
 from tcs.placement.scoring.engines import SLICE
 from tcs.placement.tables import Reason
@@ -25,7 +24,7 @@ GRID_PARTS = (8, 4, 2, 1)
 EVERY = 4
 """Stride over the slices of the grid that the parts are timed on."""
 SERIES = ("1", "2", "cpu", "floor", "floor cpu", "overlaps")
-ARM_GAPS = ("gap_environment", "gap_body", "gap_arm")
+ARM_GAPS = ("environment", "body", "arm")
 
 
 def sweep_costs(bench: Bench, repeats: int) -> None:
@@ -90,13 +89,16 @@ def part_costs(bench: Bench, pairs: tuple[Pair, ...], repeats: int) -> None:
     kinematics from the measure.
     """
     problem = bench.problem
-    no_goals = {"goal_R": problem.goal_R[:, :0].copy(), "goal_p": problem.goal_p[:, :0].copy()}
     no_reach = problem.arm._replace(elbow_cos=np.array([-np.inf, -np.inf]))
-    no_gaps = {name: np.full_like(getattr(problem, name), UNCHECKED) for name in ARM_GAPS}
+    no_gaps = {
+        name: np.full_like(getattr(problem.clearances, name), UNCHECKED) for name in ARM_GAPS
+    }
+    without_goals = problem.at_poses(problem.goals.R[:, :0], problem.goals.p[:, :0])
+    without_gaps = problem._replace(clearances=problem.clearances._replace(**no_gaps))
     stages = {
-        "base": (problem._replace(**no_goals), bench.grippers[:, :0].copy()),
+        "base": (without_goals, bench.grippers[:, :0].copy()),
         "reach": (problem._replace(arm=no_reach), bench.grippers),
-        "solved": (problem._replace(**no_gaps), bench.grippers),
+        "solved": (without_gaps, bench.grippers),
         "all": (problem, bench.grippers),
     }
     taken: dict[str, list[float]] = {name: [] for name in stages}
@@ -124,12 +126,11 @@ def _winners(bench: Bench, checker: WinnersChecker) -> FloatArray:
 
 def _processor_seconds(problem: Problem, grippers: IntArray, grid: GridArrays) -> float:
     """Return the processor time of every EVERY-th slice of the grid."""
-    goals, used = problem.goal_p.shape[1], 0.0
+    used = 0.0
     for start in range(0, grid.size, EVERY * SLICE):
         rows = grid_rows(grid, start, min(start + SLICE, grid.size))
-        scores = new_scores(rows.state.size, goals)
         begun = time.process_time()
-        score_rows(problem, grippers, rows, scores)
+        score(problem, rows, grippers)
         used += time.process_time() - begun
     return used
 

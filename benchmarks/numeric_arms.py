@@ -20,8 +20,8 @@ from tcs.kernel.analytic.solver import outside_solver
 from tcs.kernel.arrays import GridArrays
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.rows import grid_rows
-from tcs.kernel.scores import REACHED, new_scores
-from tcs.kernel.sweep import gripper_contacts, score_rows
+from tcs.kernel.scores import REACHED
+from tcs.kernel.sweep import gripper_contacts, score
 from tcs.placement.scoring import load_job
 from tcs.placement.scoring.engines import SLICE
 
@@ -63,9 +63,7 @@ def reached(problem: Problem, grid: GridArrays, jobs: int) -> tuple[NDArray[np.b
 
     def part(start: int) -> NDArray[np.bool_]:
         rows = grid_rows(grid, start, min(start + SLICE, size))
-        scores = new_scores(rows.state.size, problem.goal_p.shape[1])
-        score_rows(problem, grippers, rows, scores)
-        return scores.reason == REACHED
+        return score(problem, rows, grippers).reason == REACHED
 
     # Compiled, or loaded, before the clock runs.
     part(size)

@@ -14,7 +14,7 @@ from tcs.kernel.problem import Problem
 from tcs.kernel.rows import Rows, rows_at
 from tcs.kernel.scores import Scores, new_scores
 
-# `score_rows` does the same with memory of its own, but is not compiled: a call from Python takes
+# `score` does the same with memory of its own, but is not compiled: a call from Python takes
 # longer than a pair.
 from tcs.kernel.sweep import _score_rows
 from tcs.kernel.workspace import Workspace, new_workspace
@@ -73,11 +73,10 @@ class Kernel:
 
     def __init__(self, bench: Bench) -> None:
         """Cut the problem into one for each goal."""
-        goals = range(bench.problem.goal_p.shape[1])
+        goals = range(bench.problem.goals.p.shape[1])
         self._problems = [
-            bench.problem._replace(
-                goal_R=np.ascontiguousarray(bench.problem.goal_R[:, g : g + 1]),
-                goal_p=np.ascontiguousarray(bench.problem.goal_p[:, g : g + 1]),
+            bench.problem.at_poses(
+                bench.problem.goals.R[:, g : g + 1], bench.problem.goals.p[:, g : g + 1]
             )
             for g in goals
         ]

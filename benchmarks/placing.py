@@ -92,7 +92,7 @@ def trajectory(problem: Problem, rng: np.random.Generator, count: int) -> FloatA
             break
     base = turn(rng.uniform(-np.pi, np.pi))
     base[:2, 3] = rng.uniform(-1.0, 1.0, 2)
-    X_WA = base @ pose(problem.base_R[0], problem.base_p[0])
+    X_WA = base @ pose(problem.arm_base.R[0], problem.arm_base.p[0])
     return np.stack([X_WA @ tool(problem, q) for q in np.linspace(start, end, count)])
 
 
@@ -100,8 +100,8 @@ def tool(problem: Problem, q: FloatArray) -> FloatArray:
     """Return the pose of the tool in A at joint angles, shape (4, 4)."""
     X = np.eye(4)
     for i in range(7):
-        X = X @ pose(problem.chain_R[i], problem.chain_p[i]) @ turn(q[i])
-    return X @ pose(problem.chain_R[7], problem.chain_p[7])
+        X = X @ pose(problem.chain.R[i], problem.chain.p[i]) @ turn(q[i])
+    return X @ pose(problem.chain.R[7], problem.chain.p[7])
 
 
 def pose(R: FloatArray, p: FloatArray) -> FloatArray:

@@ -19,8 +19,8 @@ from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.kernel.postures import free_postures, measures, tool_poses
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.rows import Rows, single_row
-from tcs.kernel.scores import REACHED, new_scores
-from tcs.kernel.sweep import gripper_contacts, score_rows
+from tcs.kernel.scores import REACHED
+from tcs.kernel.sweep import score
 from tcs.kernel.workspace import new_workspace
 from tcs.model.grid import Axis, Grid
 from tcs.model.robots import RobotFile, load_robot
@@ -191,7 +191,7 @@ class Reach:
             joints: Arm joints [rad], shape (n, 7).
         """
         R, p = np.empty((len(joints), 3, 3)), np.empty((len(joints), 3))
-        tool_poses(self._problem.chain_R, self._problem.chain_p, _writable(joints), R, p)
+        tool_poses(self._problem.chain.R, self._problem.chain.p, _writable(joints), R, p)
         return R, p
 
     def manipulability(self, joints: FloatArray) -> FloatArray:
@@ -212,8 +212,8 @@ class Reach:
             level: Index of the torso height.
         """
         R_AT, p_AT = self.tool_poses(joints)
-        R_BA, p_BA = self._problem.base_R[level], self._problem.base_p[level]
-        problem = _with_goals(self._problem, R_BA @ R_AT, p_AT @ R_BA.T + p_BA)
+        R_BA, p_BA = self._problem.arm_base.R[level], self._problem.arm_base.p[level]
+        problem = self._problem.at_poses((R_BA @ R_AT)[None], (p_AT @ R_BA.T + p_BA)[None])
         free = np.zeros(len(joints), np.bool_)
         free_postures(
             problem, new_workspace(problem), single_row(torso=level), _writable(joints), free
@@ -250,18 +250,12 @@ def _solve_part(
     solved: Solved,
 ) -> int:
     """Solve a slice of the poses into its rows of `solved`; return their number."""
-    problem = _with_goals(problem, R_BT[part], p_BT[part])
+    scores = score(problem.at_poses(R_BT[None, part], p_BT[None, part]), at)
     count: int = part.stop - part.start
-    scores = new_scores(1, count)
-    score_rows(problem, gripper_contacts(problem), at, scores)
     solved.reached[part] = scores.reason[0] == REACHED
     solved.manipulability[part] = scores.dexterity[0]
     solved.joints[part] = scores.joints[0]
     return count
-
-
-def _with_goals(problem: Problem, R_BT: FloatArray, p_BT: FloatArray) -> Problem:
-    return problem._replace(goal_R=_writable(R_BT)[None], goal_p=_writable(p_BT)[None])
 
 
 def _writable(array: NDArray[Any]) -> FloatArray:

@@ -17,8 +17,8 @@ from tcs.files.quantities import ANGLE, POSITION
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import single_row
-from tcs.kernel.scores import BODY_BLOCKED, REACHED, new_scores
-from tcs.kernel.sweep import gripper_contacts, score_rows
+from tcs.kernel.scores import BODY_BLOCKED, REACHED
+from tcs.kernel.sweep import score
 from tcs.model.grid import Axis, Grid
 from tcs.model.robots import RobotFile, load_robot
 from tcs.model.scene import EnvironmentFile, LoweredScene, Scene, SceneSpec, load_environment, lower
@@ -163,6 +163,5 @@ class Surroundings:
         """Return whether the body is in contact at a base pose in W, and the reached tool poses."""
         lowered = self._lowered(torso_height)
         arrays = lowered.arrays._replace(goal_R=R_WT[None], goal_p=p_WT[None])
-        problem, scores = build_problem(arrays), new_scores(1, len(p_WT))
-        score_rows(problem, gripper_contacts(problem), single_row(*base_pose), scores)
+        scores = score(build_problem(arrays), single_row(*base_pose))
         return bool(np.any(scores.reason == BODY_BLOCKED)), scores.reason[0] == REACHED

@@ -27,7 +27,7 @@ def place_base(problem: Problem, work: Workspace, rows: Rows, n: int) -> None:
     R, p = work.R_BW, work.p_BW
     R[0, 0], R[0, 1], R[1, 0], R[1, 1] = c, s, -s, c
     p[0], p[1] = -(c * x + s * y), s * x - c * y
-    environment = problem.environment[rows.state[n]]
+    environment = problem.environment.shapes[rows.state[n]]
     for j in range(len(environment)):
         move(R, p, environment, j, work.environment_B, j)
 
@@ -46,7 +46,7 @@ def shares_base(rows: Rows, n: int, other: int) -> bool:
 @inner
 def goal_in_arm_base(problem: Problem, work: Workspace, state: int, torso: int, g: int) -> None:
     """Fill the nominal pose of a goal in the arm base A, `work.R_AG` and `work.p_AG`."""
-    pose_in_arm_base(problem, work, torso, problem.goal_R[state, g], problem.goal_p[state, g])
+    pose_in_arm_base(problem, work, torso, problem.goals.R[state, g], problem.goals.p[state, g])
 
 
 @inner
@@ -54,7 +54,7 @@ def pose_in_arm_base(
     problem: Problem, work: Workspace, torso: int, R_WG: FloatArray, p_WG: FloatArray
 ) -> None:
     """Fill the pose in the arm base A of a pose in W, `work.R_AG` and `work.p_AG`."""
-    A, a = problem.base_R[torso], problem.base_p[torso]
+    A, a = problem.arm_base.R[torso], problem.arm_base.p[torso]
     R_BW, p_BW, R_AG, p_AG = work.R_BW, work.p_BW, work.R_AG, work.p_AG
     for r in range(3):
         p_AG[r] = 0.0
@@ -77,7 +77,7 @@ def pose_in_arm_base(
 @inner
 def environment_in_arm_base(problem: Problem, work: Workspace, torso: int) -> None:
     """Transform the environment from B to A and list the shapes within the arm's reach."""
-    A, a = problem.base_R[torso], problem.base_p[torso]
+    A, a = problem.arm_base.R[torso], problem.arm_base.p[torso]
     environment_B, environment_A = work.environment_B, work.environment_A
     count = 0
     for j in range(len(environment_B)):
@@ -88,7 +88,7 @@ def environment_in_arm_base(problem: Problem, work: Workspace, torso: int) -> No
                 along += A[m, r] * (environment_B[j, CENTRE + m] - a[m])
             environment_A[j, CENTRE + r] = along
             square += along * along
-        reach = problem.arm_radius + environment_B[j, BOUND]
+        reach = problem.clearances.arm_radius + environment_B[j, BOUND]
         if square > reach * reach:
             continue
         work.near[count] = j

@@ -30,8 +30,8 @@ AT_GOAL = 1e-7
 def contact_code(problem: Problem, robot_body: int, other: int, partner: int) -> int:
     """Return the code of a contact between a robot body and body `other` of a partner."""
     if partner != ENVIRONMENT:
-        other += problem.environment_bodies
-    return robot_body * (problem.environment_bodies + problem.robot_bodies) + other
+        other += problem.environment.bodies
+    return robot_body * (problem.environment.bodies + problem.robot_bodies) + other
 
 
 @inner
@@ -40,14 +40,15 @@ def base_contact(problem: Problem, work: Workspace, torso: int, mount: int) -> i
 
     `work.environment_B` must be up to date.
     """
-    body, environment, gaps = problem.body[torso], work.environment_B, problem.gap_base
-    mounts, sphere = problem.body_mount, problem.body_spheres[torso, mount]
-    groups, first, boxes = problem.body_groups, problem.body_groups.first, len(mounts)
+    body, environment = problem.body.shapes[torso], work.environment_B
+    gaps = problem.clearances.base
+    mounts, sphere = problem.body.mount, problem.body.spheres[torso, mount]
+    groups, first, boxes = problem.body.groups, problem.body.groups.first, len(mounts)
     for j in range(len(environment)):
         x = environment[j, CENTRE] - sphere[0]
         y = environment[j, CENTRE + 1] - sphere[1]
         z = environment[j, CENTRE + 2] - sphere[2]
-        apart = environment[j, BOUND] + sphere[3] + problem.widest_gap
+        apart = environment[j, BOUND] + sphere[3] + problem.clearances.widest
         if apart <= 0.0 or x * x + y * y + z * z > apart * apart:
             continue
         for g in range(len(first) - 1):
@@ -60,7 +61,7 @@ def base_contact(problem: Problem, work: Workspace, torso: int, mount: int) -> i
             ):
                 i = work.touching[0]
                 return contact_code(
-                    problem, problem.body_body[i], problem.environment_body[j], ENVIRONMENT
+                    problem, problem.body.body[i], problem.environment.body[j], ENVIRONMENT
                 )
     return NO_CONTACT
 
@@ -83,7 +84,7 @@ def rest_contact(problem: Problem, work: Workspace, torso: int) -> int:
     If another rest posture touches nothing, neither does this one: NO_CONTACT.
     """
     code, touching = NO_CONTACT, work.touching
-    for n in range(problem.rest.shape[1]):
+    for n in range(problem.rest.shapes.shape[1]):
         found = touches_at_rest(problem, work, torso, n)
         if not found:
             return NO_CONTACT
@@ -95,9 +96,9 @@ def rest_contact(problem: Problem, work: Workspace, torso: int) -> int:
 @inner
 def touches_at_rest(problem: Problem, work: Workspace, torso: int, n: int) -> bool:
     """Return whether the arm in rest posture n touches the environment; fills `work.touching`."""
-    environment, gaps = work.environment_B, problem.gap_environment
-    arm, spheres = problem.rest[torso, n], problem.rest_spheres[torso]
-    groups, boxes, widest = problem.link_groups, len(problem.link_body), problem.widest_gap
+    environment, gaps = work.environment_B, problem.clearances.environment
+    arm, spheres = problem.rest.shapes[torso, n], problem.rest.spheres[torso]
+    groups, boxes, widest = problem.links.groups, len(problem.links.body), problem.clearances.widest
     for j in range(len(environment)):
         if not spheres_overlap(spheres, n, environment, j, widest) or not sphere_is_near(
             spheres, n, environment, j, widest
@@ -117,7 +118,7 @@ def touches_at_rest(problem: Problem, work: Workspace, torso: int, n: int) -> bo
 @inner
 def gripper_environment_contact(problem: Problem, work: Workspace, state: int, goal: int) -> int:
     """Return the first contact of the gripper with the environment, the tool being at a goal."""
-    R, p = problem.goal_R[state, goal], problem.goal_p[state, goal]
+    R, p = problem.goals.R[state, goal], problem.goals.p[state, goal]
     return gripper_contact_at(problem, work, state, R, p)
 
 
@@ -127,9 +128,10 @@ def gripper_contact_at(
 ) -> int:
     """Return the first contact of the gripper with the environment, the tool at a pose in W."""
     place_gripper(problem, work, R, p)
-    arm, environment, gaps = work.arm, problem.environment[state], problem.gap_environment
-    box = len(problem.link_body)
-    for g in range(problem.gripper_groups):
+    arm, environment = work.arm, problem.environment.shapes[state]
+    gaps = problem.clearances.environment
+    box = len(problem.links.body)
+    for g in range(problem.links.gripper_groups):
         for j in range(len(environment)):
             gap = gaps[box + g, j]
             if (
@@ -148,10 +150,10 @@ def gripper_body_contact(problem: Problem, work: Workspace, body_A: FloatArray) 
     The gripper's groups in A remain in `work.arm`.
     """
     place_gripper(problem, work, work.R_AG, work.p_AG)
-    arm, gaps = work.arm, problem.gap_body
-    box, others = len(problem.link_body), len(problem.body_body)
-    for g in range(problem.gripper_groups):
-        for h in range(len(problem.body_groups.first) - 1):
+    arm, gaps = work.arm, problem.clearances.body
+    box, others = len(problem.links.body), len(problem.body.body)
+    for g in range(problem.links.gripper_groups):
+        for h in range(len(problem.body.groups.first) - 1):
             gap = gaps[box + g, others + h]
             if (
                 gap > 0.0
@@ -166,13 +168,13 @@ def gripper_body_contact(problem: Problem, work: Workspace, body_A: FloatArray) 
 def place_gripper(problem: Problem, work: Workspace, R: FloatArray, p: FloatArray) -> None:
     """Place the groups of the last link such that the tool is at the pose (R, p)."""
     R7, p7 = work.link_R[7], work.link_p[7]
-    F, f = problem.chain_R[7], problem.chain_p[7]
+    F, f = problem.chain.R[7], problem.chain.p[7]
     for r in range(3):
         for c in range(3):
             R7[r, c] = R[r, 0] * F[c, 0] + R[r, 1] * F[c, 1] + R[r, 2] * F[c, 2]
     for r in range(3):
         p7[r] = p[r] - (R7[r, 0] * f[0] + R7[r, 1] * f[1] + R7[r, 2] * f[2])
-    for g in range(problem.gripper_groups):
+    for g in range(problem.links.gripper_groups):
         place_group(problem, work, g)
 
 
@@ -184,21 +186,22 @@ def arm_contact(problem: Problem, work: Workspace, body_A: FloatArray, q: FloatA
     `gripper_body_contact` must have placed the gripper. The last pair in contact is checked first.
     """
     arm, environment, last, touching = work.arm, work.environment_A, work.last, work.touching
-    gap_environment, gap_body, gap_arm = problem.gap_environment, problem.gap_body, problem.gap_arm
+    gaps = problem.clearances
+    gap_environment, gap_body, gap_arm = gaps.environment, gaps.body, gaps.arm
     near, near_count = work.near, work.near_count[0]
-    distances, link_body, first = problem.distances, problem.link_body, problem.link_groups.first
-    body_body, body_first = problem.body_body, problem.body_groups.first
+    distances, link_body, first = problem.distances, problem.links.body, problem.links.groups.first
+    body_body, body_first = problem.body.body, problem.body.groups.first
     groups, body_groups = len(first) - 1, len(body_first) - 1
-    boxes, body_boxes = len(problem.link_body), len(problem.body_body)
-    link_poses(problem.chain_R, problem.chain_p, q, work.link_R, work.link_p)
-    if len(problem.coupled):
+    boxes, body_boxes = len(problem.links.body), len(problem.body.body)
+    link_poses(problem.chain.R, problem.chain.p, q, work.link_R, work.link_p)
+    if len(problem.chain.coupled):
         place_coupled_links(problem, work, q)
     partner, i, j = last[0], last[1], last[2]
     if partner >= 0 and pair_touches(problem, work, body_A, q, partner, i, j):
-        if partner == ARM and problem.link_frame[j] == 7:
+        if partner == ARM and problem.links.frame[j] == 7:
             work.met_gripper[0] = True
         return pair_code(problem, partner, i, j)
-    for g in range(problem.gripper_groups, groups):
+    for g in range(problem.links.gripper_groups, groups):
         box, body = boxes + g, link_body[first[g]]
         place_group(problem, work, g)
         for n in range(near_count):
@@ -230,7 +233,7 @@ def arm_contact(problem: Problem, work: Workspace, body_A: FloatArray, q: FloatA
                 and arm_touches(problem, work, g, h)
             ):
                 last[0], last[1], last[2] = ARM, touching[0], touching[1]
-                if h < problem.gripper_groups:
+                if h < problem.links.gripper_groups:
                     work.met_gripper[0] = True
                 return pair_code(problem, ARM, last[1], last[2])
     return NO_CONTACT
@@ -239,9 +242,9 @@ def arm_contact(problem: Problem, work: Workspace, body_A: FloatArray, q: FloatA
 @inner
 def place_coupled_links(problem: Problem, work: Workspace, q: FloatArray) -> None:
     """Fill the poses of the links between coupled joints, behind the link of their joint."""
-    for n in range(len(problem.coupled)):
-        i = int(problem.coupled[n, 0])
-        behind = (1.0 - problem.coupled[n, 1]) * problem.chain_p[i, 3] * q[i]
+    for n in range(len(problem.chain.coupled)):
+        i = int(problem.chain.coupled[n, 0])
+        behind = (1.0 - problem.chain.coupled[n, 1]) * problem.chain.p[i, 3] * q[i]
         for r in range(3):
             work.link_p[8 + n, r] = work.link_p[i + 1, r] - behind * work.link_R[i + 1, r, 2]
             for c in range(3):
@@ -254,7 +257,7 @@ def at_goal(problem: Problem, work: Workspace) -> bool:
 
     Forward kinematics thus confirms every solution that counts as reached.
     """
-    R, p, F, f = work.link_R[7], work.link_p[7], problem.chain_R[7], problem.chain_p[7]
+    R, p, F, f = work.link_R[7], work.link_p[7], problem.chain.R[7], problem.chain.p[7]
     worst = 0.0
     for r in range(3):
         along = p[r] + R[r, 0] * f[0] + R[r, 1] * f[1] + R[r, 2] * f[2] - work.p_AG[r]
@@ -286,16 +289,16 @@ def pair_touches(
         i: Shape of the arm.
         j: Shape of the partner.
     """
-    arm, distances, body = work.arm, problem.distances, problem.link_body[i]
+    arm, distances, body = work.arm, problem.distances, problem.links.body[i]
     place_link(problem, work, i)
     if partner == ENVIRONMENT:
-        return closer(arm, i, work.environment_A, j, problem.gap_environment[i, j])
+        return closer(arm, i, work.environment_A, j, problem.clearances.environment[i, j])
     if partner == BODY:
-        gap = problem.gap_body[i, j]
-        other = problem.body_body[j]
+        gap = problem.clearances.body[i, j]
+        other = problem.body.body[j]
         return closer(arm, i, body_A, j, gap) and not are_apart(distances, body, other, q, gap)
     place_link(problem, work, j)
-    gap, other = problem.gap_arm[i, j], problem.link_body[j]
+    gap, other = problem.clearances.arm[i, j], problem.links.body[j]
     return closer(arm, i, arm, j, gap) and not are_apart(distances, body, other, q, gap)
 
 
@@ -303,9 +306,9 @@ def pair_touches(
 def pair_code(problem: Problem, partner: int, i: int, j: int) -> int:
     """Return the contact code of arm shape i and shape j of a partner."""
     if partner == ENVIRONMENT:
-        other = problem.environment_body[j]
+        other = problem.environment.body[j]
     elif partner == BODY:
-        other = problem.body_body[j]
+        other = problem.body.body[j]
     else:
-        other = problem.link_body[j]
-    return contact_code(problem, problem.link_body[i], other, partner)
+        other = problem.links.body[j]
+    return contact_code(problem, problem.links.body[i], other, partner)

@@ -33,7 +33,7 @@ def environment_touches(
 
     Call it, and the functions below, for a group whose bounding sphere touches.
     """
-    arm, first, gaps = work.arm, problem.link_groups.first, problem.gap_environment
+    arm, first, gaps = work.arm, problem.links.groups.first, problem.clearances.environment
     box = first[-1] + g
     gap = gaps[box, j]
     return (
@@ -48,7 +48,7 @@ def _link_touches_shape(
     problem: Problem, work: Workspace, g: int, b: FloatArray, j: int, gaps: FloatArray
 ) -> bool:
     """Return whether a shape of group g of the arm touches row j of b; fills `work.touching`."""
-    groups, touching = problem.link_groups, work.touching
+    groups, touching = problem.links.groups, work.touching
     first, end = groups.first[g], groups.first[g + 1]
     touching[0], touching[1] = first, j
     # The box of a single shape is the shape, and touches.
@@ -90,7 +90,7 @@ def _link_touches_group(
     """
     if others.first[h + 1] - others.first[h] == 1:
         return _link_touches_shape(problem, work, g, b, others.first[h], gaps)
-    groups = problem.link_groups
+    groups = problem.links.groups
     box, other, least = groups.first[-1] + g, others.first[-1] + h, groups.first[g + 1]
     seen = _seen_from(problem, work, g, b, other, gaps)
     for c in range(groups.clusters[g], groups.clusters[g + 1]):
@@ -126,7 +126,7 @@ def _row_touches(
     Places row i where its bounding sphere is near. Its gap, which lies far from those of the other
     rows in memory, is read only then.
     """
-    if not _is_near(problem.links, i, seen) or gaps[i, j] <= 0.0:
+    if not _is_near(problem.links.shapes, i, seen) or gaps[i, j] <= 0.0:
         return False
     place_link(problem, work, i)
     return closer(work.arm, i, b, j, gaps[i, j])
@@ -143,7 +143,7 @@ def _seen_from(
         the frame of the row [m]; the half sizes of the row's core; and the radius around it that no
         bounding sphere may enter, with the gap of the group [m].
     """
-    frame = problem.link_frame[problem.link_groups.first[g]]
+    frame = problem.links.frame[problem.links.groups.first[g]]
     R, p = work.link_R[frame], work.link_p[frame]
     x, y, z = p[0] - b[j, CENTRE], p[1] - b[j, CENTRE + 1], p[2] - b[j, CENTRE + 2]
     ax, bx, cx = R[0, 0], R[0, 1], R[0, 2]
@@ -169,7 +169,7 @@ def _seen_from(
         hx,
         hy,
         hz,
-        radius + gaps[problem.link_groups.first[-1] + g, j] + ROUNDING,
+        radius + gaps[problem.links.groups.first[-1] + g, j] + ROUNDING,
     )
 
 
@@ -187,8 +187,8 @@ def _is_near(links: FloatArray, i: int, seen: tuple[float, ...]) -> bool:
 @inner
 def body_touches(problem: Problem, work: Workspace, body_A: FloatArray, g: int, h: int) -> bool:
     """Return whether group g of the arm touches group h of the body; fills `work.touching`."""
-    others, gaps = problem.body_groups, problem.gap_body
-    box, other = problem.link_groups.first[-1] + g, others.first[-1] + h
+    others, gaps = problem.body.groups, problem.clearances.body
+    box, other = problem.links.groups.first[-1] + g, others.first[-1] + h
     gap = gaps[box, other]
     return (
         sphere_is_near(work.arm, box, body_A, other, gap)
@@ -200,7 +200,7 @@ def body_touches(problem: Problem, work: Workspace, body_A: FloatArray, g: int, 
 @inner
 def arm_touches(problem: Problem, work: Workspace, g: int, h: int) -> bool:
     """Return whether two groups of the arm touch; fills `work.touching`."""
-    arm, groups, gaps = work.arm, problem.link_groups, problem.gap_arm
+    arm, groups, gaps = work.arm, problem.links.groups, problem.clearances.arm
     box, other = groups.first[-1] + g, groups.first[-1] + h
     gap = gaps[box, other]
     if not (sphere_is_near(arm, box, arm, other, gap) and closer(arm, box, arm, other, gap)):

@@ -70,14 +70,14 @@ def free_postures(
     state, torso = row.state[0], row.torso[0]
     place_base(problem, work, row, 0)
     environment_in_arm_base(problem, work, torso)
-    body_A = problem.body_A[torso]
+    body_A = problem.body.shapes_A[torso]
     work.last[0] = -1
     for i in range(len(q)):
         free[i] = False
         if gripper_environment_contact(problem, work, state, i) != NO_CONTACT:
             continue
         tool_pose(
-            problem.chain_R, problem.chain_p, q[i], work.link_R, work.link_p, work.R_AG, work.p_AG
+            problem.chain.R, problem.chain.p, q[i], work.link_R, work.link_p, work.R_AG, work.p_AG
         )
         if gripper_body_contact(problem, work, body_A) != NO_CONTACT:
             continue

@@ -31,82 +31,107 @@ TOUCH = 1e-9
 """Least gap of a pair that is checked [m], negligible against any clearance that matters."""
 
 
-class Problem(NamedTuple):
-    """One scene and its goals, in some environment states and at some torso levels.
+class Links(NamedTuple):
+    """The chain of the arm, see `Chain`."""
 
-    The robot's shapes are grouped by body: the rows of shapes are followed by those of
-    `ShapeGroups`. A gap of a box is the greatest gap of its shapes.
-    """
-
-    measure: Dexterity
-    """Dexterity measure to maximise."""
-    arm: ArmSolver
-    """Constants of the closed form, which may describe the reversed chain; without branches if
-    there is none (`is_outside`), or the arm has six joints, which `six_joints` solves. The other
-    fields describe the arm itself."""
-    chain_R: FloatArray
+    R: FloatArray
     """Rotations of the chain, shape (8, 3, 3)."""
-    chain_p: FloatArray
+    p: FloatArray
     """Translations of the chain [m], shape (8, 3); with a fourth column, `Chain.slides`, if there
     are prismatic joints."""
     coupled: FloatArray
     """As in `Chain`."""
     joints: int
     """Number of joints of the arm, as in `Chain`."""
-    links: FloatArray
-    """The arm's shapes, packed, in link frames, nearest to the tool first, then the boxes around
-    them, shape (arm rows, 17)."""
-    link_frame: IntArray
-    """Link of each row in `links`, 7 .. 1 or the number of a coupled link's frame, shape
+
+
+class Frames(NamedTuple):
+    """The arm base A in the robot's base B, for each torso level."""
+
+    R: FloatArray
+    """Orientations, shape (torso levels, 3, 3)."""
+    p: FloatArray
+    """Origins [m], shape (torso levels, 3)."""
+
+
+class ArmShapes(NamedTuple):
+    """The arm's shapes, packed, nearest to the tool first, then the boxes around their groups."""
+
+    shapes: FloatArray
+    """The shapes and boxes in link frames, shape (arm rows, 17)."""
+    frame: IntArray
+    """Link of each row in `shapes`, 7 .. 1 or the number of a coupled link's frame, shape
     (arm rows,)."""
-    link_body: IntArray
-    """Robot body of each shape in `links`, shape (n_arm,)."""
-    link_groups: ShapeGroups
-    """Groups of the shapes in `links`."""
+    body: IntArray
+    """Robot body of each shape without the boxes, shape (n_arm,)."""
+    groups: ShapeGroups
+    """Groups of the shapes."""
     gripper_groups: int
     """Number of groups of the gripper, on link 7: the first ones."""
-    base_R: FloatArray
-    """Orientation of A in B for each torso level, shape (torso levels, 3, 3)."""
-    base_p: FloatArray
-    """Origin of A in B for each torso level [m], shape (torso levels, 3)."""
-    body: FloatArray
-    """Shapes of the rest of the robot in B, packed, then the boxes around them, shape
-    (torso levels, body rows, 17)."""
-    body_A: FloatArray
-    """The rows of `body`, in A."""
-    body_groups: ShapeGroups
-    """Groups of the shapes in `body`."""
-    body_spheres: FloatArray
+
+
+class BodyShapes(NamedTuple):
+    """Shapes of the rest of the robot, packed, then the boxes around their groups."""
+
+    shapes: FloatArray
+    """The shapes and boxes in B, shape (torso levels, body rows, 17)."""
+    shapes_A: FloatArray
+    """The same in A."""
+    groups: ShapeGroups
+    """Groups of the shapes."""
+    spheres: FloatArray
     """Centre and radius of the bounding spheres of the body shapes fixed to the base (0) and
     mounted on the torso (1), in B [m], shape (torso levels, 2, 4)."""
-    body_mount: IntArray
-    """BASE_FIXED or TORSO_MOUNTED for each body shape, shape (n_body,)."""
-    body_body: IntArray
-    """Robot body of each body shape, shape (n_body,)."""
-    environment: FloatArray
-    """Shapes of the environment in W, packed, shape (environment states, n_environment, 17)."""
-    environment_body: IntArray
-    """Environment body of each environment shape, shape (n_environment,)."""
-    environment_bodies: int
+    mount: IntArray
+    """BASE_FIXED or TORSO_MOUNTED for each shape without the boxes, shape (n_body,)."""
+    body: IntArray
+    """Robot body of each shape without the boxes, shape (n_body,)."""
+
+
+class RestShapes(NamedTuple):
+    """The arm in its rest postures."""
+
+    shapes: FloatArray
+    """The rows of the arm's shapes in B in each rest posture, shape
+    (torso levels, postures, arm rows, 17)."""
+    spheres: FloatArray
+    """The bounding sphere of each, as a packed shape in B, shape (torso levels, postures, 17)."""
+
+
+class Environment(NamedTuple):
+    """Furniture and person."""
+
+    shapes: FloatArray
+    """Shapes in W, packed, shape (environment states, n_environment, 17)."""
+    body: IntArray
+    """Environment body of each shape, shape (n_environment,)."""
+    bodies: int
     """Number of bodies of the environment."""
-    robot_bodies: int
-    """Number of bodies of the robot."""
-    gap_environment: FloatArray
-    """Distance [m] that arm and environment shapes must keep, or UNCHECKED, shape
-    (arm rows, n_environment)."""
-    gap_body: FloatArray
-    """The same for arm and body shapes, shape (arm rows, body rows)."""
-    gap_arm: FloatArray
-    """The same for arm shapes among themselves, shape (arm rows, arm rows)."""
-    gap_base: FloatArray
-    """The same for body and environment shapes, shape (body rows, n_environment)."""
-    widest_gap: float
+
+
+class Clearances(NamedTuple):
+    """Distances [m] that pairs of shapes must keep, or UNCHECKED."""
+
+    environment: FloatArray
+    """Of arm and environment shapes, shape (arm rows, n_environment)."""
+    body: FloatArray
+    """Of arm and body shapes, shape (arm rows, body rows)."""
+    arm: FloatArray
+    """Of arm shapes among themselves, shape (arm rows, arm rows)."""
+    base: FloatArray
+    """Of body and environment shapes, shape (body rows, n_environment)."""
+    widest: float
     """Upper bound of all these distances [m]."""
     arm_radius: float
     """Distance from the origin of A beyond which nothing touches the arm [m]."""
-    goal_R: FloatArray
+
+
+class Goals(NamedTuple):
+    """Poses of the tool, and what is free about them."""
+
+    R: FloatArray
     """Orientations of the goals' poses in W, shape (environment states, poses, 3, 3)."""
-    goal_p: FloatArray
+    p: FloatArray
     """Positions of the goals' poses in W [m], shape (environment states, poses, 3)."""
     first_pose: IntArray
     """First pose of each goal, which any of its poses reaches, and their number, shape
@@ -116,22 +141,50 @@ class Problem(NamedTuple):
     turn: FloatArray
     """Unit axis in T about which all goals leave the tool free to rotate, if an arm of five joints
     depends on it, else zeros, shape (3,)."""
-    distances: DistanceTables
-    """Tables of distances of bodies of the robot."""
-    rest: FloatArray
-    """The rows of `links` in B with the arm in each rest posture, shape
-    (torso levels, postures, arm rows, 17)."""
-    rest_spheres: FloatArray
-    """The bounding sphere of each, as a packed shape in B, shape (torso levels, postures, 17)."""
 
     @property
-    def goals(self) -> int:
+    def number(self) -> int:
         """Number of goals."""
-        return goals_of(self.first_pose, self.goal_p)
+        return goals_of(self.first_pose, self.p)
 
     def poses_of(self, goal: int) -> range:
         """Return the numbers of the poses of a goal."""
         return poses_of(self.first_pose, goal)
+
+    def at(self, R: FloatArray, p: FloatArray) -> Goals:
+        """Return as many goals, or of single poses any number, at other poses in W."""
+        return self._replace(R=_own(R), p=_own(p))
+
+
+class Problem(NamedTuple):
+    """One scene and its goals, in some environment states and at some torso levels.
+
+    The robot's shapes are grouped by body: the rows of shapes are followed by those of
+    `ShapeGroups`. The clearance of a box is the greatest of its shapes.
+    """
+
+    measure: Dexterity
+    """Dexterity measure to maximise."""
+    arm: ArmSolver
+    """Constants of the closed form, which may describe the reversed chain; without branches if
+    there is none (`is_outside`), or the arm has six joints, which `six_joints` solves. The other
+    fields describe the arm itself."""
+    chain: Links
+    arm_base: Frames
+    links: ArmShapes
+    body: BodyShapes
+    rest: RestShapes
+    robot_bodies: int
+    """Number of bodies of the robot."""
+    environment: Environment
+    clearances: Clearances
+    distances: DistanceTables
+    """Tables of distances of bodies of the robot."""
+    goals: Goals
+
+    def at_poses(self, R: FloatArray, p: FloatArray) -> Problem:
+        """Return the problem with its goals at other poses in W, see `Goals.at`."""
+        return self._replace(goals=self.goals.at(R, p))
 
 
 def build_problem(scene: SceneArrays, measure: str = DEFAULT_MEASURE) -> Problem:
@@ -161,57 +214,75 @@ def build_problem(scene: SceneArrays, measure: str = DEFAULT_MEASURE) -> Problem
     in_boxes = np.array([inside[0] for inside in link_groups.in_boxes()], np.int64)
     packed = pack(scene.body)
     bodies = with_boxes(np.concatenate([packed, pack(body_A)]), body_groups)
-    rest, rest_spheres = resting_arm(scene, order, link_groups)
     robot_bodies = max(_count(scene.arm), _count(scene.body))
     return Problem(
         measure=dexterity(measure),
         arm=any_solver(scene.chain),
-        chain_R=_own(scene.chain.R),
-        chain_p=with_slides(scene.chain),
-        coupled=_own(scene.chain.coupled),
-        joints=scene.chain.joints,
-        links=with_boxes(links, link_groups)[0],
-        link_frame=np.append(frame, frame[in_boxes]),
-        link_body=link_body,
-        link_groups=link_groups,
-        gripper_groups=int(np.sum(frame[link_groups.first[:-1]] == 7)),
-        base_R=_own(scene.arm_base_R),
-        base_p=_own(scene.arm_base_p),
-        body=_own(bodies[: len(packed)]),
-        body_A=_own(bodies[len(packed) :]),
-        body_groups=body_groups,
-        body_spheres=_bounding_spheres(packed, scene.body.frame),
-        body_mount=mount,
-        body_body=body_body,
-        environment=pack(scene.environment),
-        environment_body=scene.environment.body.astype(np.int64),
-        environment_bodies=_count(scene.environment),
+        chain=Links(
+            R=_own(scene.chain.R),
+            p=with_slides(scene.chain),
+            coupled=_own(scene.chain.coupled),
+            joints=scene.chain.joints,
+        ),
+        arm_base=Frames(_own(scene.arm_base_R), _own(scene.arm_base_p)),
+        links=ArmShapes(
+            shapes=with_boxes(links, link_groups)[0],
+            frame=np.append(frame, frame[in_boxes]),
+            body=link_body,
+            groups=link_groups,
+            gripper_groups=int(np.sum(frame[link_groups.first[:-1]] == 7)),
+        ),
+        body=BodyShapes(
+            shapes=_own(bodies[: len(packed)]),
+            shapes_A=_own(bodies[len(packed) :]),
+            groups=body_groups,
+            spheres=_bounding_spheres(packed, scene.body.frame),
+            mount=mount,
+            body=body_body,
+        ),
+        rest=RestShapes(*resting_arm(scene, order, link_groups)),
         robot_bodies=robot_bodies,
-        gap_environment=with_group_rows(
-            _gaps(scene.arm_vs_environment[order], pads[0], pads[2], margin), link_groups
+        environment=Environment(
+            shapes=pack(scene.environment),
+            body=scene.environment.body.astype(np.int64),
+            bodies=_count(scene.environment),
         ),
-        gap_body=_with_groups(
-            _gaps(scene.arm_vs_body[order], pads[0], pads[1], self_margin), link_groups, body_groups
+        clearances=Clearances(
+            environment=with_group_rows(
+                _gaps(scene.arm_vs_environment[order], pads[0], pads[2], margin), link_groups
+            ),
+            body=_with_groups(
+                _gaps(scene.arm_vs_body[order], pads[0], pads[1], self_margin),
+                link_groups,
+                body_groups,
+            ),
+            arm=_with_groups(
+                _gaps(scene.arm_vs_arm[order][:, order], pads[0], pads[0], self_margin),
+                link_groups,
+                link_groups,
+            ),
+            base=with_group_rows(
+                _gaps(scene.body_vs_environment, pads[1], pads[2], margin), body_groups
+            ),
+            widest=widest,
+            arm_radius=_arm_radius(scene.chain, links[0], frame) + widest,
         ),
-        gap_arm=_with_groups(
-            _gaps(scene.arm_vs_arm[order][:, order], pads[0], pads[0], self_margin),
-            link_groups,
-            link_groups,
-        ),
-        gap_base=with_group_rows(
-            _gaps(scene.body_vs_environment, pads[1], pads[2], margin), body_groups
-        ),
-        widest_gap=widest,
-        arm_radius=_arm_radius(scene.chain, links[0], frame) + widest,
-        goal_R=_own(scene.goal_R),
-        goal_p=_own(scene.goal_p),
-        first_pose=np.array(scene.first_pose, dtype=np.int64),
-        freedom=free_goals(scene.freedom, scene.chain, dexterity(measure)),
-        turn=axis_left_free(scene.freedom, scene.chain),
         distances=arranged(scene.distances, robot_bodies),
-        rest=rest,
-        rest_spheres=rest_spheres,
+        goals=Goals(
+            R=_own(scene.goal_R),
+            p=_own(scene.goal_p),
+            first_pose=np.array(scene.first_pose, dtype=np.int64),
+            freedom=free_goals(scene.freedom, scene.chain, dexterity(measure)),
+            turn=axis_left_free(scene.freedom, scene.chain),
+        ),
     )
+
+
+def chain_of(problem: Problem) -> Chain:
+    """Return the chain of a problem's arm."""
+    R, p, _, joints = problem.chain
+    slides = p[:7, 3].copy() if p.shape[1] > 3 else np.zeros(7)
+    return Chain(R, p[:, :3].copy(), problem.arm.lower, problem.arm.upper, joints, slides)
 
 
 def with_environment(problem: Problem, scene: SceneArrays) -> Problem:
@@ -221,11 +292,8 @@ def with_environment(problem: Problem, scene: SceneArrays) -> Problem:
         problem: A problem of the same scene.
         scene: The scene with these states of its environment.
     """
-    return problem._replace(
-        environment=pack(scene.environment),
-        goal_R=_own(scene.goal_R),
-        goal_p=_own(scene.goal_p),
-    )
+    environment = problem.environment._replace(shapes=pack(scene.environment))
+    return problem.at_poses(scene.goal_R, scene.goal_p)._replace(environment=environment)
 
 
 def gaps_between(
@@ -238,8 +306,8 @@ def gaps_between(
     Args:
         first: The scene of one arm.
         second: The scene of the other.
-        groups: `link_groups` of the problem of the first.
-        other_groups: `link_groups` of the problem of the second.
+        groups: `links.groups` of the problem of the first.
+        other_groups: `links.groups` of the problem of the second.
 
     Returns:
         Rows and columns in the order of the problems, with those of the boxes at the end.

@@ -28,6 +28,11 @@ class Rows(NamedTuple):
     torso: IntArray
     """Number of the torso level in the problem, shape (n,)."""
 
+    @property
+    def number(self) -> int:
+        """Number of rows."""
+        return len(self.state)
+
     def at(self, which: slice | NDArray[np.bool_] | IntArray) -> Rows:
         """Return some of the rows."""
         return Rows(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -47,23 +48,23 @@ class Scores(NamedTuple):
     """Joint angles of the best solution [rad], unchanged where not reached, shape
     (n, goals, 7)."""
 
-    def part(self, rows: slice) -> Scores:
-        """Return the scores of consecutive rows, as views."""
-        return Scores(
-            self.reason[rows], self.contact[rows], self.dexterity[rows], self.joints[rows]
-        )
-
     def put(self, rows: IntArray | NDArray[np.bool_], found: Scores) -> None:
         """Replace the scores of some rows."""
         self.reason[rows], self.contact[rows] = found.reason, found.contact
         self.dexterity[rows], self.joints[rows] = found.dexterity, found.joints
 
 
+def joined(parts: Iterable[Scores]) -> Scores:
+    """Return the scores of all rows of one part after the other."""
+    return Scores(*map(np.concatenate, zip(*parts, strict=True)))
+
+
 def new_scores(rows: int, goals: int) -> Scores:
     """Return scores to be filled: dexterity and joints are 0 where nothing is reached."""
     return Scores(
-        reason=np.empty((rows, goals), np.uint8),
-        contact=np.empty((rows, goals), np.int32),
+        # No reason and no contact: what is not scored must not count as reached.
+        reason=np.full((rows, goals), 255, np.uint8),
+        contact=np.full((rows, goals), -9, np.int32),
         dexterity=np.zeros((rows, goals), np.float32),
         joints=np.zeros((rows, goals, JOINTS), np.float32),
     )

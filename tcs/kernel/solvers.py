@@ -45,9 +45,9 @@ def new_solver(problem: Problem) -> Solver:
         ArmClassError: If an arm of six joints cannot be solved, or one of five for goals that leave
             what they leave free.
     """
-    if problem.joints == 5:
+    if problem.chain.joints == 5:
         return new_five_joint_solver(problem)
-    if problem.joints == 6:
+    if problem.chain.joints == 6:
         return new_six_joint_solver(problem)
     return new_numeric_solver(problem) if is_outside(problem.arm) else new_search()
 

@@ -35,6 +35,7 @@ from tcs.kernel.scores import (
     REACHED,
     TOO_FAR,
     Scores,
+    new_scores,
     progress_of,
 )
 from tcs.kernel.solvers import Solver, new_solver, out_of_reach, score_pair
@@ -50,9 +51,9 @@ def gripper_contacts(problem: Problem) -> IntArray:
     that an arm of five joints turns, they are NO_CONTACT: the gripper is checked when the arm is
     solved.
     """
-    states, first = len(problem.goal_p), problem.freedom.codes
-    poses = int(first[-1]) if first.size else problem.goal_p.shape[1]
-    if problem.joints == FEWEST_JOINTS:
+    states, first = len(problem.goals.p), problem.goals.freedom.codes
+    poses = int(first[-1]) if first.size else problem.goals.p.shape[1]
+    if problem.chain.joints == FEWEST_JOINTS:
         return np.full((states, poses), NO_CONTACT, np.int64)
     codes = np.empty((states, poses), np.int64)
     _gripper_contacts(problem, freedom_if_any(problem), new_workspace(problem), codes)
@@ -61,7 +62,7 @@ def gripper_contacts(problem: Problem) -> IntArray:
 
 def freedom_if_any(problem: Problem) -> FreeGoals | None:
     """Return the freedom of the goals; None leaves what is for it out of the compiled code."""
-    return problem.freedom if problem.freedom.first.size else None
+    return problem.goals.freedom if problem.goals.freedom.first.size else None
 
 
 @jit
@@ -70,7 +71,7 @@ def _gripper_contacts(
 ) -> None:
     problem, work = unowned(owned_problem), unowned(owned_work)
     for s in range(codes.shape[0]):
-        for g in range(problem.goal_p.shape[1]):
+        for g in range(problem.goals.p.shape[1]):
             if free is None:
                 codes[s, g] = gripper_environment_contact(problem, work, s, g)
             else:
@@ -97,27 +98,27 @@ def _sampled_contacts(
                 codes[s, code] = UNKNOWN
             else:
                 turned_parameters(free.u[free.start[g] + n], angle, u)
-                pose_of(free.form[g], u, problem.goal_R[s, g], problem.goal_p[s, g], R, p)
+                pose_of(free.form[g], u, problem.goals.R[s, g], problem.goals.p[s, g], R, p)
                 codes[s, code] = gripper_contact_at(problem, work, s, R, p)
             code += 1
 
 
 def blocked_grippers(problem: Problem) -> BoolArray:
     """Return whether the gripper is in contact at every pose of a goal, shape (states, goals)."""
-    found, free = gripper_contacts(problem) != NO_CONTACT, problem.freedom
+    found, free = gripper_contacts(problem) != NO_CONTACT, problem.goals.freedom
     if free.first.size:
         found = np.logical_and.reduceat(found, free.codes[: len(free.form)], axis=1)
         _look_further(problem, new_workspace(problem), found)
-    if not problem.first_pose.size:
+    if not problem.goals.first_pose.size:
         return found
-    return np.logical_and.reduceat(found, problem.first_pose[:-1], axis=1)
+    return np.logical_and.reduceat(found, problem.goals.first_pose[:-1], axis=1)
 
 
 @jit
 def _look_further(owned_problem: Problem, owned_work: Workspace, blocked: BoolArray) -> None:
     """Keep what is blocked at all samples only where it is at all further poses too, in place."""
     problem, work = unowned(owned_problem), unowned(owned_work)
-    free, R, p, u = problem.freedom, np.empty((3, 3)), np.empty(3), np.empty(PARAMETERS)
+    free, R, p, u = problem.goals.freedom, np.empty((3, 3)), np.empty(3), np.empty(PARAMETERS)
     for s in range(blocked.shape[0]):
         for g in range(blocked.shape[1]):
             start, form = free.start[g], free.form[g]
@@ -127,23 +128,25 @@ def _look_further(owned_problem: Problem, owned_work: Workspace, blocked: BoolAr
                     if not blocked[s, g]:
                         break
                     turned_parameters(free.u[start + free.children[child]], angle, u)
-                    pose_of(form, u, problem.goal_R[s, g], problem.goal_p[s, g], R, p)
+                    pose_of(form, u, problem.goals.R[s, g], problem.goals.p[s, g], R, p)
                     blocked[s, g] = gripper_contact_at(problem, work, s, R, p) != NO_CONTACT
 
 
-def score_rows(problem: Problem, grippers: IntArray, rows: Rows, scores: Scores) -> None:
-    """Score configurations.
+def score(problem: Problem, rows: Rows, grippers: IntArray | None = None) -> Scores:
+    """Return the scores of configurations at all goals.
 
     Args:
         problem: The scene and its goals.
-        grippers: From `gripper_contacts`.
         rows: The configurations.
-        scores: Filled; every array has a row for each of `rows`. `dexterity` and `joints` are
-            written only where a goal is reached, `reason` and `contact` everywhere.
+        grippers: From `gripper_contacts`; None to find them here.
     """
+    if grippers is None:
+        grippers = gripper_contacts(problem)
+    scores = new_scores(rows.number, problem.goals.number)
     # Allocated here to outlive the call: the compiled code takes unowned views of these arrays.
     work, solver, free = new_workspace(problem), new_solver(problem), freedom_if_any(problem)
     _score_rows(problem, free, work, solver, grippers, rows, scores)
+    return scores
 
 
 @jit
@@ -160,10 +163,10 @@ def _score_rows(
     work, solver, rows = unowned(owned_work), unowned(owned_solver), unowned(owned_rows)
     rounded, is_placed = np.empty(7), np.zeros(1, np.bool_)
     base_code = NO_CONTACT
-    goals = len(problem.first_pose) - 1
+    goals = len(problem.goals.first_pose) - 1
     are_poses = goals < 0
     if are_poses:
-        goals = problem.goal_p.shape[1]
+        goals = problem.goals.p.shape[1]
     for row in range(len(rows.state)):
         state, torso = rows.state[row], rows.torso[row]
         if row == 0 or not shares_base(rows, row, row - 1):
@@ -180,8 +183,8 @@ def _score_rows(
         work.last[0] = -1
         is_placed[0] = False
         for g in range(goals):
-            first = g if are_poses else problem.first_pose[g]
-            last = g + 1 if are_poses else problem.first_pose[g + 1]
+            first = g if are_poses else problem.goals.first_pose[g]
+            last = g + 1 if are_poses else problem.goals.first_pose[g + 1]
             farthest = -1
             for pose in range(first, last):
                 reason, code = _score_at_pose(
@@ -238,7 +241,7 @@ def _score_at_pose(
     reason = out_of_reach(problem, work, solver)
     if reason == TOO_FAR:
         return reason, NO_CONTACT
-    body_A = problem.body_A[torso]
+    body_A = problem.body.shapes_A[torso]
     code = gripper_body_contact(problem, work, body_A)
     if code != NO_CONTACT:
         return GRIPPER_BLOCKED_BY_ROBOT, code

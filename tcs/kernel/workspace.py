@@ -16,8 +16,8 @@ class Workspace(NamedTuple):
     """Scratch of one worker, reused from pair to pair."""
 
     arm: FloatArray
-    """Rows of `Problem.links` in A at the current posture; of groups that `is_placed` does not name
-    only the shapes that were looked at."""
+    """Rows of `Problem.links.shapes` in A at the current posture; of groups that `is_placed` does
+    not name only the shapes that were looked at."""
     is_placed: BoolArray
     """Whether the shapes of each group of the arm are up to date, shape (arm groups,)."""
     touching: IntArray
@@ -53,15 +53,15 @@ class Workspace(NamedTuple):
 def new_workspace(problem: Problem) -> Workspace:
     """Return scratch memory for one worker."""
     return Workspace(
-        np.empty_like(problem.links),
-        np.zeros(len(problem.link_groups.first) - 1, np.bool_),
+        np.empty_like(problem.links.shapes),
+        np.zeros(len(problem.links.groups.first) - 1, np.bool_),
         np.zeros(2, np.int64),
-        np.empty_like(problem.environment[0]),
-        np.empty_like(problem.environment[0]),
-        np.zeros(problem.environment_body.size, np.int64),
+        np.empty_like(problem.environment.shapes[0]),
+        np.empty_like(problem.environment.shapes[0]),
+        np.zeros(problem.environment.body.size, np.int64),
         np.zeros(1, np.int64),
-        np.empty((8 + len(problem.coupled), 3, 3)),
-        np.empty((8 + len(problem.coupled), 3)),
+        np.empty((8 + len(problem.chain.coupled), 3, 3)),
+        np.empty((8 + len(problem.chain.coupled), 3)),
         np.full(3, -1, np.int64),
         np.zeros(1, np.bool_),
         np.eye(3),
@@ -74,7 +74,7 @@ def new_workspace(problem: Problem) -> Workspace:
 @inner
 def place_group(problem: Problem, work: Workspace, g: int) -> None:
     """Place the box around a group of the arm in A; its shapes have to follow."""
-    place_link(problem, work, problem.link_groups.first[-1] + g)
+    place_link(problem, work, problem.links.groups.first[-1] + g)
     work.is_placed[g] = False
 
 
@@ -83,7 +83,7 @@ def place_shapes(problem: Problem, work: Workspace, g: int) -> None:
     """Place the shapes and clusters of a group of the arm in A unless they are up to date."""
     if work.is_placed[g]:
         return
-    groups = problem.link_groups
+    groups = problem.links.groups
     for i in range(groups.first[g], groups.first[g + 1]):
         place_link(problem, work, i)
     for c in range(groups.clusters[g], groups.clusters[g + 1]):
@@ -94,5 +94,5 @@ def place_shapes(problem: Problem, work: Workspace, g: int) -> None:
 @inner
 def place_link(problem: Problem, work: Workspace, i: int) -> None:
     """Place arm shape i in A from the link poses in the workspace."""
-    frame = problem.link_frame[i]
-    move(work.link_R[frame], work.link_p[frame], problem.links, i, work.arm, i)
+    frame = problem.links.frame[i]
+    move(work.link_R[frame], work.link_p[frame], problem.links.shapes, i, work.arm, i)

@@ -131,10 +131,10 @@ class _Search:
         An arm of five joints rotates its tool at a goal, and its lines with it.
         """
         problem, count = self.stop.problem, len(postures)
-        if not np.any(problem.turn):
+        if not np.any(problem.goals.turn):
             return [(postures, self.R_AG)]
         R_AT, p_AT = np.empty((count, 3, 3)), np.empty((count, 3))
-        tool_poses(problem.chain_R, problem.chain_p, postures, R_AT, p_AT)
+        tool_poses(problem.chain.R, problem.chain.p, postures, R_AT, p_AT)
         return [(postures[n : n + 1], R_AT[n]) for n in range(count)]
 
     def _retreat(self, approach: Curve, R_AT: FloatArray) -> Curve | None:

@@ -160,7 +160,7 @@ class ApproachScene:
         To a free goal the line ends where the tool is at the end of the curve.
         """
         scene, worst, task = self.scene, 0.0, self.job.task
-        axis, end = self.problem.turn, goal_poses(scene, task)[goal]
+        axis, end = self.problem.goals.turn, goal_poses(scene, task)[goal]
         if task.goals[goal].free is not None:
             scene.set_arm(curve.q[-1])
             end = scene.tool_pose()

@@ -12,8 +12,8 @@ from tcs.kernel.motion.scene import goal_from_arm_base
 from tcs.kernel.postures import tool_poses
 from tcs.kernel.problem import Problem
 from tcs.kernel.rows import rows_at
-from tcs.kernel.scores import REACHED, new_scores
-from tcs.kernel.sweep import gripper_contacts, score_rows
+from tcs.kernel.scores import REACHED
+from tcs.kernel.sweep import gripper_contacts, score
 
 Pose = tuple[FloatArray, FloatArray]
 """Orientation, shape (3, 3), and position [m], shape (3,)."""
@@ -47,12 +47,11 @@ class FreeGoalPoses:
 
     def _scored(self, configuration: int) -> list[Pose]:
         problem, row = self._problem, rows_at(self._grid, [configuration])
-        goals = problem.goals
-        scores = new_scores(1, goals)
-        score_rows(problem, self._grippers, row, scores)
+        goals = problem.goals.number
+        scores = score(problem, row, self._grippers)
         q = scores.joints[0].astype(np.float64)
         R_AT, p_AT = np.empty((goals, 3, 3)), np.empty((goals, 3))
-        tool_poses(problem.chain_R, problem.chain_p, q, R_AT, p_AT)
+        tool_poses(problem.chain.R, problem.chain.p, q, R_AT, p_AT)
         poses = []
         for goal, reason in enumerate(scores.reason[0]):
             R_GT, p_GT = np.eye(3), np.zeros(3)

@@ -230,7 +230,7 @@ def _tool(timing: Timed, stop: Stop) -> tuple[float, float]:
     end = scene.tool_pose()
     scene.set_arm(timing.positions[0])
     begin = scene.tool_pose()
-    axis = stop.problem.turn
+    axis = stop.problem.goals.turn
     line = end.translation() - begin.translation()
     line = line / max(float(np.linalg.norm(line)), POSITION_BAR)
 

@@ -163,7 +163,7 @@ class StopGrid:
 
         Pairs of the robot's own shapes that never touch are left out.
         """
-        every, robot = torso_scene(self.problem, torso), self.problem.environment_bodies
+        every, robot = torso_scene(self.problem, torso), self.problem.environment.bodies
         other = every.body[every.pair[:, 1]]
         kept = needed_pairs(every, other >= robot)
         of_fixed = carriers(self.problem)
@@ -256,12 +256,12 @@ class Stop:
     def is_sampled(self) -> bool:
         """Whether more angles of a free joint give more postures of the arm at a goal."""
         problem = self.grid.problem
-        return problem.joints == CHAIN and not is_outside(problem.arm)
+        return problem.chain.joints == CHAIN and not is_outside(problem.arm)
 
     @property
     def joints(self) -> int:
         """Number of joints of the arm."""
-        return self.grid.problem.joints
+        return self.grid.problem.chain.joints
 
     @property
     def velocity(self) -> FloatArray:

@@ -12,8 +12,7 @@ from tcs.capability.surroundings import Surroundings
 from tcs.errors import TaskError, TcsError
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import grid_rows
-from tcs.kernel.scores import new_scores
-from tcs.kernel.sweep import gripper_contacts, score_rows
+from tcs.kernel.sweep import score
 from tests.capability.test_surroundings import boxes
 from tests.kernel.judge import compare
 
@@ -88,8 +87,7 @@ def test_displaced_scenes_agree_with_the_plain_loop_reference(post, best):
             base_yaw=np.array([best.yaw + of_base[2]]),
         )
         count = len(p)
-        problem, scores = build_problem(arrays), new_scores(1, count)
-        score_rows(problem, gripper_contacts(problem), grid_rows(grid), scores)
+        scores = score(build_problem(arrays), grid_rows(grid))
         compare(arrays, grid, scores, [(0, g) for g in range(count)])
         grasps = replace(moved, positions=tuple(
             replace(one, grasps=tuple(replace(g, pre_grasps=()) for g in one.grasps))

@@ -85,7 +85,7 @@ def test_reference_and_dense_scan_agree(scene):
     found = np.argwhere(scores.reason == REACHED)[:3]
     for h, g in found:
         assert is_served(several, grid, h, g, scores.joints[h, g].astype(float))
-        expected = free_score(several, grid, h, g, problem.freedom)
+        expected = free_score(several, grid, h, g, problem.goals.freedom)
         assert expected.reason == REACHED
         assert scores.dexterity[h, g] >= expected.dexterity - 1e-6
     left = np.argwhere(~np.isin(scores.reason, (REACHED, BODY_BLOCKED)))[:3]

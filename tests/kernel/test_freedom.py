@@ -213,7 +213,7 @@ def test_dense_scan_finds_no_further_solution(name, rng, monkeypatch):
 def test_a_gripper_is_blocked_where_all_its_poses_are():
     scene = scene_with(FREEDOMS["rotation"], goals=4)
     problem = build_problem(scene)
-    free, every, samples = problem.freedom, [], []
+    free, every, samples = problem.goals.freedom, [], []
     for g in range(4):
         poses = [at_offset(scene, g, offset(free.form[g], u)) for u in free.u]
         codes = [gripper_contacts(build_problem(posed))[0, g] for posed in poses]

@@ -22,8 +22,8 @@ NONE = -1
 @jit
 def place_environment(problem, work, q):
     """Place the groups of the arm at joint angles q; the environment stands as it does in W."""
-    link_poses(problem.chain_R, problem.chain_p, q, work.link_R, work.link_p)
-    work.environment_A[:] = problem.environment[0]
+    link_poses(problem.chain.R, problem.chain.p, q, work.link_R, work.link_p)
+    work.environment_A[:] = problem.environment.shapes[0]
 
 
 @jit
@@ -47,7 +47,7 @@ def first_pair(problem, work, body_A, partner, g, h, found):
 @jit
 def first_of_all(problem, work, a, b, gaps, g, parts, found):
     """Fill the first rows of group g of the arm, in `a`, and of `parts` in b that touch."""
-    first = problem.link_groups.first
+    first = problem.links.groups.first
     found[:] = NONE
     for i in range(first[g], first[g + 1]):
         for j in range(parts[0], parts[1]):
@@ -59,7 +59,7 @@ def first_of_all(problem, work, a, b, gaps, g, parts, found):
 @jit
 def place_all(problem, work):
     """Place every row of the arm."""
-    for i in range(len(problem.links)):
+    for i in range(len(problem.links.shapes)):
         place_link(problem, work, i)
 
 
@@ -69,15 +69,15 @@ def test_pair_is_the_first_that_touches(lowered, seed):
     # Shapes of one kind only would leave a case of `_seen_from` out.
     scene = crowded(toy_scene(chain, seed, obstacles=12), rng, 30)
     problem = build_problem(scene)
-    assert set(problem.environment[0, :, TYPE]) == {SPHERE, CAPSULE, BOX}
-    of_arm, of_body = problem.link_groups.first, problem.body_groups.first
-    every = np.arange(problem.environment.shape[1] + 1)
+    assert set(problem.environment.shapes[0, :, TYPE]) == {SPHERE, CAPSULE, BOX}
+    of_arm, of_body = problem.links.groups.first, problem.body.groups.first
+    every = np.arange(problem.environment.shapes.shape[1] + 1)
     work, whole = new_workspace(problem), new_workspace(problem)
-    body = problem.body_A[0]
+    body = problem.body.shapes_A[0]
     partners = (
-        (ENVIRONMENT, problem.environment[0], problem.gap_environment, every),
-        (BODY, body, problem.gap_body, of_body),
-        (ARM, whole.arm, problem.gap_arm, of_arm),
+        (ENVIRONMENT, problem.environment.shapes[0], problem.clearances.environment, every),
+        (BODY, body, problem.clearances.body, of_body),
+        (ARM, whole.arm, problem.clearances.arm, of_arm),
     )
     found, right = np.empty(2, np.int64), np.empty(2, np.int64)
     counts = np.zeros((3, 2), int)

@@ -9,12 +9,13 @@ from tcs.kernel.arrays import SPHERE, GridArrays, SceneArrays
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import rows_at
 from tcs.kernel.scores import REACHED
+from tcs.kernel.sweep import score
 from tcs.kernel.verification.plain_dexterity import isotropy
 from tests.kernel.judge import is_true
 from tests.kernel.shapes import as_shapes, placed, random_joints, straight_arm
 from tests.kernel.toy import arm_shapes
 from tests.reference import pairs as reference_pairs
-from tests.reference.constructed import same_branch, score_one, with_goals
+from tests.reference.constructed import same_branch, with_goals
 from tests.reference.kinematics import free_joint, jacobian, link_poses
 
 LIMITS = np.array([2.9, 2.0, 2.9, 2.1, 2.9, 2.1, 3.0])
@@ -54,7 +55,7 @@ def scene_of(chain, q, obstacles=(), arm=None):
 def score_of(scene, q):
     """Return the measure of the goal, which must be reached, as it is at posture q."""
     assert reference_pairs.confirms(scene, HERE, 0, 0, q)
-    scores = score_one(build_problem(scene), rows_at(HERE, [0]))
+    scores = score(build_problem(scene), rows_at(HERE, [0]))
     assert scores.reason[0, 0] == REACHED
     assert is_true(scene, HERE, 0, 0, scores.joints[0, 0])
     return scores.dexterity[0, 0]

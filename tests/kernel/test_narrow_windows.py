@@ -8,10 +8,10 @@ import pytest
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import rows_at
 from tcs.kernel.scores import REACHED
+from tcs.kernel.sweep import score as scores_of
 from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan
 from tcs.placement.scoring import load_job
 from tests.kernel.judge import is_true
-from tests.reference.constructed import score_one as scores_of
 
 # Configuration and goal of feeding. Every sample but those next to a limit touches something.
 NEXT_TO_A_LIMIT = [

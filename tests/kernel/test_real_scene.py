@@ -11,13 +11,14 @@ from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import rows_at
 from tcs.kernel.scores import GRIPPER_BLOCKED_BY_ROBOT, REACHED
+from tcs.kernel.sweep import score
 from tcs.kernel.workspace import new_workspace
 from tcs.model.scene import Scene, SceneSpec, lower
 from tcs.placement.scoring import sweep
 from tcs.placement.tables import Reason
 from tests.chosen import some_of
 from tests.kernel.judge import compare, is_true, stratified
-from tests.reference.constructed import posture_contact, random_posture, score_one, with_goals
+from tests.reference.constructed import posture_contact, random_posture, with_goals
 
 
 @pytest.fixture(scope="module")
@@ -122,6 +123,6 @@ def test_the_kernel_agrees_with_drake_at_margins_of_its_own(spec, shaving, full_
 @pytest.mark.parametrize(("h", "g"), [(54470, 6), (54470, 7), (55934, 6)], ids=str)
 def test_gripper_against_robot_is_reported_before_joint_limits(lowered, h, g):
     # Joint 1 would have to pass its limits, and the gripper at the goal touches the robot.
-    scores = score_one(build_problem(lowered.arrays), rows_at(lowered.grid, [h]))
+    scores = score(build_problem(lowered.arrays), rows_at(lowered.grid, [h]))
     assert scores.reason[0, g] == GRIPPER_BLOCKED_BY_ROBOT
     assert scores.contact[0, g] >= 0

@@ -16,7 +16,7 @@ from numba.core import types
 
 import tcs
 from tcs.kernel.sources import COMPILER, SOURCES, Sources, homes
-from tcs.kernel.sweep import score_rows
+from tcs.kernel.sweep import score
 from tcs.kernel.views import UnownedView
 
 PACKAGE = Path(tcs.__path__[0])
@@ -53,7 +53,7 @@ def test_all_that_the_kernel_imports_is_among_its_sources():
 
 
 def test_scoring_is_made_of_neither_approaches_nor_motions():
-    assert score_rows.__module__ == "tcs.kernel.sweep"
+    assert score.__module__ == "tcs.kernel.sweep"
     found = SOURCES.closure(["tcs.kernel.sweep"])
     assert {"tcs.kernel.kinematics", "tcs.kernel.freedom.forms", "tcs.kernel.scores"} < found
     others = "tcs.kernel.approach", "tcs.kernel.motion", "tcs.kernel.sets", "tcs.placement"

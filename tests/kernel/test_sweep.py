@@ -70,11 +70,11 @@ def test_clusters_of_a_body_with_many_shapes_change_no_score(lowered, seed, monk
     chain = chain_of(seed, lowered)
     rng, grid = np.random.default_rng(seed), toy_grid()
     scene = crowded(toy_scene(chain, seed, obstacles=4), rng, 30)
-    assert max(np.diff(build_problem(scene).link_groups.clusters)) > 2
+    assert max(np.diff(build_problem(scene).links.groups.clusters)) > 2
     scores = scores_of(scene, grid)
     compare(scene, grid, scores, stratified(rng, scores.reason, 1))
     monkeypatch.setattr(groups, "CLUSTER", len(scene.body.type))
-    assert max(np.diff(build_problem(scene).body_groups.clusters)) == 1
+    assert max(np.diff(build_problem(scene).body.groups.clusters)) == 1
     whole = scores_of(scene, grid)
     for name in ("reason", "contact", "dexterity", "joints"):
         np.testing.assert_array_equal(getattr(scores, name), getattr(whole, name))
@@ -336,22 +336,12 @@ SCRIPT = """
 import pickle, sys
 import numpy as np
 from tcs.kernel.problem import build_problem
-from tcs.kernel.sweep import gripper_contacts, score_rows
+from tcs.kernel.sweep import score
 from tcs.kernel.rows import grid_rows
-from tcs.kernel.scores import Scores
 with open(sys.argv[1], "rb") as file:
     scene, grid, rows = pickle.load(file)
-problem = build_problem(scene)
-goals = scene.goal_p.shape[1]
-shape = (rows[1] - rows[0], goals)
-scores = Scores(
-    np.full(shape, 99, np.uint8),
-    np.zeros(shape, np.int32),
-    np.zeros(shape, np.float32),
-    np.zeros((*shape, 7), np.float32),
-)
 with np.errstate(all="ignore"):
-    score_rows(problem, gripper_contacts(problem), grid_rows(grid, *rows), scores)
+    scores = score(build_problem(scene), grid_rows(grid, *rows))
 with open(sys.argv[2], "wb") as file:
     pickle.dump(tuple(scores), file)
 """

@@ -10,8 +10,8 @@ from tcs.kernel.analytic.solver import outside_solver
 from tcs.kernel.arrays import BOX, CAPSULE, SPHERE, GridArrays, SceneArrays, Shapes
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import grid_rows
-from tcs.kernel.scores import Scores
-from tcs.kernel.sweep import gripper_contacts, score_rows
+from tcs.kernel.scores import joined
+from tcs.kernel.sweep import gripper_contacts, score
 from tests.kernel.shapes import as_shapes, placed, random_joints, rotation
 from tests.reference.kinematics import compose, inverse, link_poses, rot_z
 
@@ -189,20 +189,12 @@ def scores_of(scene, grid, cuts=None, measure="isotropy", numeric=False):
     problem = build_problem(scene, measure)
     if numeric:
         problem = problem._replace(arm=outside_solver(scene.chain))
-    size, goals = size_of(grid), problem.goals
-    scores = Scores(
-        # Values that no score has, so that unfilled entries are detected.
-        reason=np.full((size, goals), 99, np.uint8),
-        contact=np.full((size, goals), -9, np.int32),
-        dexterity=np.zeros((size, goals), np.float32),
-        joints=np.zeros((size, goals, 7), np.float32),
-    )
     grippers = gripper_contacts(problem)
-    cuts = [0, *(cuts or []), size]
-    for start, stop in itertools.pairwise(cuts):
-        part = Scores(*(array[start:stop] for array in scores))
-        score_rows(problem, grippers, grid_rows(grid, start, stop), part)
-    return scores
+    cuts = [0, *(cuts or []), size_of(grid)]
+    return joined(
+        score(problem, grid_rows(grid, start, stop), grippers)
+        for start, stop in itertools.pairwise(cuts)
+    )
 
 
 def goal_in_base(scene, grid, h, goal):

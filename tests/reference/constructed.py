@@ -35,8 +35,8 @@ from tcs.kernel.contacts import (
 )
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.rows import Rows, rows_at
-from tcs.kernel.scores import Scores, new_scores
-from tcs.kernel.sweep import gripper_contacts, score_rows
+from tcs.kernel.scores import Scores
+from tcs.kernel.sweep import score
 from tcs.kernel.views import unowned
 from tcs.kernel.workspace import Workspace, new_workspace
 from tests.reference.kinematics import (
@@ -75,14 +75,7 @@ class Constructed:
     def scores(self, measure: str = "isotropy") -> Scores:
         """Return the kernel's scores of the configuration, shapes (1, goals, ...)."""
         row = rows_at(self.grid, [self.configuration])
-        return score_one(build_problem(self.scene, measure), row)
-
-
-def score_one(problem: Problem, row: Rows) -> Scores:
-    """Return the kernel's scores of one configuration, shapes (1, goals, ...)."""
-    scores = new_scores(1, problem.goal_p.shape[1])
-    score_rows(problem, gripper_contacts(problem), row, scores)
-    return scores
+        return score(build_problem(self.scene, measure), row)
 
 
 def singular_angles(chain: Chain, joint: int) -> list[float]:
@@ -371,7 +364,7 @@ def posture_contact(
     if code != NO_CONTACT:
         return code
     goal_in_arm_base(problem, work, state, torso, goal)
-    body_A = problem.body_A[torso]
+    body_A = problem.body.shapes_A[torso]
     code = gripper_body_contact(problem, work, body_A)
     if code != NO_CONTACT:
         return code

@@ -24,8 +24,8 @@ from tcs.kernel.arrays import (
 from tcs.kernel.contacts import BASE_FIXED
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.rows import grid_rows
-from tcs.kernel.scores import REACHED, new_scores
-from tcs.kernel.sweep import gripper_contacts, score_rows
+from tcs.kernel.scores import REACHED
+from tcs.kernel.sweep import gripper_contacts, score
 from tcs.model.grid import Axis, Grid
 from tcs.model.robots import RobotFile
 from tcs.model.scene import EnvironmentFile, LoweredScene, Scene, SceneSpec, lower
@@ -75,7 +75,7 @@ def label(
     grid = lowered.grid._replace(environment_states=task.height.count)
     problem = build_problem(arrays)
     states, x, y = task.height.count, task.base_x.count, task.base_y.count
-    goals = problem.goals
+    goals = problem.goals.number
     found = np.empty((states * x * y, goals), np.bool_)
     grippers = gripper_contacts(problem)
     done = 0
@@ -185,7 +185,6 @@ def _label_slice(
     problem: Problem, grippers: Any, grid: GridArrays, start: int, found: BoolArray
 ) -> int:
     """Fill the labels of consecutive base positions from `start` on; return their number."""
-    scores = new_scores(*found.shape)
-    score_rows(problem, grippers, grid_rows(grid, start, start + len(found)), scores)
+    scores = score(problem, grid_rows(grid, start, start + len(found)), grippers)
     found[:] = scores.reason == REACHED
     return found.size

@@ -162,8 +162,8 @@ def free_between(
         if placed == m:
             _copy_poses(R[0, 1], p[0, 1], R[0, 0], p[0, 0])
         else:
-            link_poses(problem.chain_R, problem.chain_p, search.found_q[m], R[0, 0], p[0, 0])
-        link_poses(problem.chain_R, problem.chain_p, search.found_q[n], R[0, 1], p[0, 1])
+            link_poses(problem.chain.R, problem.chain.p, search.found_q[m], R[0, 0], p[0, 0])
+        link_poses(problem.chain.R, problem.chain.p, search.found_q[n], R[0, 1], p[0, 1])
         placed, top = n, 1
         while top and halvings < MAX_HALVINGS:
             top -= 1
@@ -264,11 +264,11 @@ def _table_may_clear(problem: Problem, search: Search, top: int, pair: IntArray)
         return False
     i, j = pair[1], pair[2]
     if pair[0] == ARM:
-        other, gap = problem.link_body[j], problem.gap_arm[i, j]
+        other, gap = problem.links.body[j], problem.clearances.arm[i, j]
     else:
-        other, gap = problem.body_body[j], problem.gap_body[i, j]
+        other, gap = problem.body.body[j], problem.clearances.body[i, j]
     distances, ends = problem.distances, search.ends_q[top]
-    n = distances.of_bodies[problem.link_body[i], other]
+    n = distances.of_bodies[problem.links.body[i], other]
     return n >= 0 and may_come_apart(distances, n, ends[0], ends[1], PATH, gap)
 
 
@@ -282,9 +282,9 @@ def _motion(
         if side == 2 and pair[0] != ARM:
             break
         i = pair[side]
-        frame, rows = problem.link_frame[i], search.moved
-        move(R[0, frame], p[0, frame], problem.links, i, rows, ZERO)
-        move(R[1, frame], p[1, frame], problem.links, i, rows, ONE)
+        frame, rows = problem.links.frame[i], search.moved
+        move(R[0, frame], p[0, frame], problem.links.shapes, i, rows, ZERO)
+        move(R[1, frame], p[1, frame], problem.links.shapes, i, rows, ONE)
         total += np.sqrt(_square(rows, CENTRE, ONE))
         shape = int(rows[0, TYPE])
         if shape == CAPSULE:
@@ -316,16 +316,16 @@ def _touches(
 ) -> bool:
     """Return whether a pair would be in contact even if its shapes came apart by half a motion."""
     partner, i, j = pair[0], pair[1], pair[2]
-    frame = problem.link_frame[i]
-    move(link_R[frame], link_p[frame], problem.links, i, work.arm, i)
+    frame = problem.links.frame[i]
+    move(link_R[frame], link_p[frame], problem.links.shapes, i, work.arm, i)
     if partner == ENVIRONMENT:
-        others, gap = work.environment_A, problem.gap_environment[i, j]
+        others, gap = work.environment_A, problem.clearances.environment[i, j]
     elif partner == ARM:
-        frame = problem.link_frame[j]
-        move(link_R[frame], link_p[frame], problem.links, j, work.arm, j)
-        others, gap = work.arm, problem.gap_arm[i, j]
+        frame = problem.links.frame[j]
+        move(link_R[frame], link_p[frame], problem.links.shapes, j, work.arm, j)
+        others, gap = work.arm, problem.clearances.arm[i, j]
     else:
-        others, gap = body_A, problem.gap_body[i, j]
+        others, gap = body_A, problem.clearances.body[i, j]
     gap -= 0.5 * PATH * motion
     # Cores of spheres and capsules that overlap tell no depth: only their radii can be used up.
     radii = 0.0

@@ -124,7 +124,7 @@ def _place_line(problem: Problem, approach: ListedApproach[Any], q: FloatArray) 
         work, offset = approach.work, approach.offset
         x, y, z = _in_tool(work.R_AG, offset)
         link_R, link_p = np.empty((8, 3, 3)), np.empty((8, 3))
-        tool_pose(problem.chain_R, problem.chain_p, q, link_R, link_p, work.R_AG, work.p_AG)
+        tool_pose(problem.chain.R, problem.chain.p, q, link_R, link_p, work.R_AG, work.p_AG)
         for r in range(3):
             offset[r] = work.R_AG[r, 0] * x + work.R_AG[r, 1] * y + work.R_AG[r, 2] * z
     place_line(approach.scene, approach.work, approach.curve)

@@ -54,21 +54,22 @@ def approach_scene(problem: Problem) -> LineScene:
     Pairs of the robot's own shapes that touch at no torso level are left out.
     """
     first = torso_scene(problem, 0)
-    needed = needed_pairs(first, first.body[first.pair[:, 1]] >= problem.environment_bodies)
+    needed = needed_pairs(first, first.body[first.pair[:, 1]] >= problem.environment.bodies)
     apart = _is_apart_from_torso(problem, first)
-    for torso in range(1, len(problem.base_R)):
+    for torso in range(1, len(problem.arm_base.R)):
         left = ~needed & apart
         if np.any(left):
             fixed = first.fixed.copy()
-            fixed[problem.environment_body.size :] = problem.body_A[torso, : len(problem.body_body)]
+            bodies = len(problem.body.body)
+            fixed[problem.environment.body.size :] = problem.body.shapes_A[torso, :bodies]
             some = with_pairs(first._replace(fixed=fixed), left)
             needed[left] = needed_pairs(some, np.ones(len(some.pair), np.bool_))
     scene = grouped(with_pairs(first, needed), carriers(problem))
     of_robot = np.concatenate(
-        [problem.body_A[:, : len(problem.body_body)], _boxes(problem, scene)], axis=1
+        [problem.body.shapes_A[:, : len(problem.body.body)], _boxes(problem, scene)], axis=1
     )
     moving = np.flatnonzero(_is_moved(of_robot))
-    first_shape = len(scene.links) + problem.environment_body.size
+    first_shape = len(scene.links) + problem.environment.body.size
     return LineScene(scene, first_shape + moving, np.ascontiguousarray(of_robot[:, moving]))
 
 
@@ -79,8 +80,8 @@ def _is_apart_from_torso(problem: Problem, scene: MotionScene) -> BoolArray:
         problem: The scene.
         scene: A scene of it without groups; the result has shape (n_pairs,).
     """
-    moved = np.append(_is_moved(problem.body_A), False)
-    shape = scene.pair[:, 1] - len(scene.links) - problem.environment_body.size
+    moved = np.append(_is_moved(problem.body.shapes_A), False)
+    shape = scene.pair[:, 1] - len(scene.links) - problem.environment.body.size
     found: BoolArray = moved[np.where(shape >= 0, shape, -1)]
     return found
 
@@ -93,16 +94,16 @@ def _is_moved(rows: FloatArray) -> BoolArray:
 
 def _boxes(problem: Problem, scene: MotionScene) -> FloatArray:
     """Return the boxes around groups of fixed shapes in A, shape (torso levels, n_boxes, 17)."""
-    shapes = problem.environment_body.size + problem.body_body.size
+    shapes = problem.environment.body.size + problem.body.body.size
     boxes = scene.fixed[shapes:]
-    bodies = scene.body[len(scene.links) + shapes :] - problem.environment_bodies
-    first = [int(np.argmax(problem.body_body == body)) for body in bodies]
-    on_base = problem.body_mount[np.array(first, np.int64)] == BASE_FIXED
-    every = np.repeat(boxes[None], len(problem.base_R), axis=0)
-    for torso, (R_BA, p_BA) in enumerate(zip(problem.base_R, problem.base_p, strict=True)):
+    bodies = scene.body[len(scene.links) + shapes :] - problem.environment.bodies
+    first = [int(np.argmax(problem.body.body == body)) for body in bodies]
+    on_base = problem.body.mount[np.array(first, np.int64)] == BASE_FIXED
+    every = np.repeat(boxes[None], len(problem.arm_base.R), axis=0)
+    for torso, (R_BA, p_BA) in enumerate(zip(problem.arm_base.R, problem.arm_base.p, strict=True)):
         # From A at the first torso level to A here, by way of the base.
-        p = R_BA.T @ (problem.base_p[0] - p_BA)
-        every[torso, on_base] = moved_shapes(boxes[on_base], R_BA.T @ problem.base_R[0], p)
+        p = R_BA.T @ (problem.arm_base.p[0] - p_BA)
+        every[torso, on_base] = moved_shapes(boxes[on_base], R_BA.T @ problem.arm_base.R[0], p)
     return every
 
 
@@ -149,5 +150,5 @@ def place_scene(
 @inner
 def pair_contact_code(problem: Problem, scene: MotionScene, k: int) -> int:
     """Return the contact code, as in `tcs.kernel.contacts`, of pair k of the scene."""
-    bodies = problem.environment_bodies + problem.robot_bodies
-    return problem.link_body[scene.pair[k, 0]] * bodies + scene.body[scene.pair[k, 1]]
+    bodies = problem.environment.bodies + problem.robot_bodies
+    return problem.links.body[scene.pair[k, 0]] * bodies + scene.body[scene.pair[k, 1]]

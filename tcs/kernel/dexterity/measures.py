@@ -149,10 +149,10 @@ def leave_turn_out(problem: Problem, q: FloatArray, J: FloatArray) -> None:
     the power of 5/6.
     """
     link_R, link_p, R, p = np.empty((8, 3, 3)), np.empty((8, 3)), np.empty((3, 3)), np.empty(3)
-    tool_pose(problem.chain_R, problem.chain_p, q, link_R, link_p, R, p)
-    a, across = np.empty(3), np.zeros((2, 3))
+    tool_pose(problem.chain.R, problem.chain.p, q, link_R, link_p, R, p)
+    turn, a, across = problem.goals.turn, np.empty(3), np.zeros((2, 3))
     for r in range(3):
-        a[r] = R[r, 0] * problem.turn[0] + R[r, 1] * problem.turn[1] + R[r, 2] * problem.turn[2]
+        a[r] = R[r, 0] * turn[0] + R[r, 1] * turn[1] + R[r, 2] * turn[2]
     # A unit vector across the axis, in the plane of its two largest components.
     i = 0
     for r in range(1, 3):
@@ -314,17 +314,17 @@ def measure_at(problem: Problem, q: FloatArray) -> float:
         JLWKI of TOC.
     """
     J = np.empty((6, 7))
-    jacobian(problem.chain_R, problem.chain_p, q, J)
-    clear_fixed(J, problem.joints)
+    jacobian(problem.chain.R, problem.chain.p, q, J)
+    clear_fixed(J, problem.chain.joints)
     if problem.measure.of == LIMIT_WEIGHTED:
         weigh(problem, q, J)
-    if problem.joints == FEWEST_JOINTS:
+    if problem.chain.joints == FEWEST_JOINTS:
         leave_turn_out(problem, q, J)
     if problem.measure.of == INVERSE_CONDITION:
         value = inverse_condition(J)
     else:
         value = isotropy(J)
-        if problem.joints == FEWEST_JOINTS:
+        if problem.chain.joints == FEWEST_JOINTS:
             value = value**1.2
     return value * limit_penalty(q, problem.arm.lower, problem.arm.upper, problem.measure.penalty)
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tcs.errors import ArmClassError
-from tcs.kernel.arrays import Chain, FloatArray, IntArray
+from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.base_pose import pose_in_arm_base
 from tcs.kernel.cache import inner, jit
 from tcs.kernel.contacts import (
@@ -21,7 +21,7 @@ from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.five_joints.turned import turned_arm
 from tcs.kernel.freedom.forms import turned_about
 from tcs.kernel.kinematics import copy_joints
-from tcs.kernel.problem import Problem
+from tcs.kernel.problem import Problem, chain_of
 from tcs.kernel.scores import (
     ARM_BLOCKED,
     GRIPPER_BLOCKED_BY_ENVIRONMENT,
@@ -64,16 +64,13 @@ def new_five_joint_solver(problem: Problem) -> FiveJointSolver:
         ArmClassError: If the goals leave no rotation of the tool free, or one that the arm cannot
             make up for.
     """
-    if not np.any(problem.turn):
+    if not np.any(problem.goals.turn):
         raise ArmClassError(
             "an arm of five joints cannot take every tool pose: its goals must leave a rotation of "
             "the tool free."
         )
-    arm, p = problem.arm, problem.chain_p
-    slides = p[:7, 3].copy() if p.shape[1] > 3 else np.zeros(7)
-    chain = Chain(problem.chain_R, p[:, :3].copy(), arm.lower, arm.upper, problem.joints, slides)
     return FiveJointSolver(
-        turned_arm(chain, problem.turn),
+        turned_arm(chain_of(problem), problem.goals.turn),
         np.empty((MOST_SOLUTIONS, 7)),
         np.empty(MOST_SOLUTIONS),
         np.zeros(1, np.int64),
@@ -197,7 +194,7 @@ def score_turned(
     first_why, first_contact = ARM_BLOCKED, NO_CONTACT
     for tries in range(count):
         top = np.argmax(solver.measure[:count])
-        turned_about(R, problem.turn, solver.angle[top], R_WT)
+        turned_about(R, problem.goals.turn, solver.angle[top], R_WT)
         why = GRIPPER_BLOCKED_BY_ENVIRONMENT
         contact = gripper_contact_at(problem, work, state, R_WT, p)
         if contact == NO_CONTACT:

@@ -106,7 +106,7 @@ def score_free(
     Returns:
         Reason and contact code, those of the first tool pose that comes farthest.
     """
-    free = problem.freedom
+    free = problem.goals.freedom
     goal = PlacedGoal(state, torso, g, g)
     best, u = np.empty(7), np.empty(PARAMETERS)
     bounds = _reach_in_goal(problem, work, goal)
@@ -155,7 +155,7 @@ def _search_list(
     Returns:
         Reason and contact code, those of the first tool pose that comes farthest.
     """
-    free = problem.freedom
+    free = problem.goals.freedom
     worth = np.empty(free.first[goal.list + 1] - free.first[goal.list], np.int64)
     top, reason, contact = _try_samples(problem, work, solver, grippers, goal, bounds, worth, best)
     if top < 0:
@@ -204,7 +204,7 @@ def _try_samples(
     Returns:
         The best sample, or -1; reason and contact code of the first one that comes farthest.
     """
-    free, start = problem.freedom, problem.freedom.start[goal.list]
+    free, start = problem.goals.freedom, problem.goals.freedom.start[goal.list]
     any_orientation = _is_spread(free, goal)
     reason, contact, farthest = TOO_FAR, NO_CONTACT, -1
     # Poses of any orientation are many: what one of them leaves out, another one finds.
@@ -270,7 +270,7 @@ def _try_next_to(
     Returns:
         The pose that reaches the goal, or -1; reason and contact code as `_try_samples`.
     """
-    free, start = problem.freedom, problem.freedom.start[goal.list]
+    free, start = problem.goals.freedom, problem.goals.freedom.start[goal.list]
     farthest = progress_of(reason)
     for n in range(len(worth)):
         first, last = free.child_first[start + n], free.child_first[start + n + 1]
@@ -317,7 +317,7 @@ def _try_cap(
         bounds: From `_reach_in_goal`.
         u: Filled with the parameters of the pose that reaches the goal.
     """
-    form, reach = problem.freedom.form[goal.goal], problem.freedom.reach
+    form, reach = problem.goals.freedom.form[goal.goal], problem.goals.freedom.reach
     cosine = cap_cosine(reach.wrist, bounds[0, :3], reach.span)
     if cosine < WIDEST_CAP or cosine > 1.0:
         return False
@@ -360,9 +360,9 @@ def _score_at(
         near: As for `score_pose`.
     """
     state, torso, g = goal.state, goal.torso, goal.goal
-    if problem.freedom.turned[g]:
+    if problem.goals.freedom.turned[g]:
         return _score_turned(problem, work, solver, grippers, goal, sample, u, least, near)
-    R, p, body_A = np.empty((3, 3)), np.empty(3), problem.body_A[torso]
+    R, p, body_A = np.empty((3, 3)), np.empty(3), problem.body.shapes_A[torso]
     code = _gripper_contact(problem, work, grippers, goal, sample, 0, u, R, p)
     if code != NO_CONTACT:
         return GRIPPER_BLOCKED_BY_ENVIRONMENT, code
@@ -389,13 +389,13 @@ def _score_turned(
 
     The arguments are those of `_score_at`; u is the tool pose at angle 0.
     """
-    state, torso, body_A = goal.state, goal.torso, problem.body_A[goal.torso]
+    state, torso, body_A = goal.state, goal.torso, problem.body.shapes_A[goal.torso]
     R, p, turned = np.empty((3, 3)), np.empty(3), np.empty(PARAMETERS)
     last = problem.arm.upper[6] - problem.arm.lower[6]
     tried, tries, met_gripper = np.empty(len(TURNS)), 0, False
     found, value, kept = False, -1.0, np.empty(7)
     reason, contact, farthest = TOO_FAR, NO_CONTACT, -1
-    for angle in range(angles_of(problem.freedom, goal.goal, sample)):
+    for angle in range(angles_of(problem.goals.freedom, goal.goal, sample)):
         if found and (problem.measure.of == ANY_MEASURE or (met_gripper and angle >= FEW)):
             break
         if tries and not met_gripper and _is_covered(tried, tries, TURNS[angle], last):
@@ -462,7 +462,7 @@ def _gripper_contact(
     For the sample and the number of the angle, the contact is known in most cases; of an arm of
     five joints, it is checked when the arm is solved.
     """
-    free, g, state = problem.freedom, goal.goal, goal.state
+    free, g, state = problem.goals.freedom, goal.goal, goal.state
     first, last = free.codes[goal.list], free.codes[goal.list + 1]
     code = UNKNOWN
     if sample != NO_SAMPLE and last > first:
@@ -473,8 +473,8 @@ def _gripper_contact(
         code = grippers[state, first + angle]
     if code >= 0:
         return code
-    pose_of(free.form[g], u, problem.goal_R[state, g], problem.goal_p[state, g], R, p)
-    if code == NO_CONTACT or problem.joints == FEWEST_JOINTS:
+    pose_of(free.form[g], u, problem.goals.R[state, g], problem.goals.p[state, g], R, p)
+    if code == NO_CONTACT or problem.chain.joints == FEWEST_JOINTS:
         return NO_CONTACT
     return gripper_contact_at(problem, work, state, R, p)
 
@@ -514,7 +514,7 @@ def _refine(
     value: float,
 ) -> None:
     """Climb from the pose with parameters u to a better one; u and `best` follow."""
-    free, g, trial = problem.freedom, goal.goal, np.empty(PARAMETERS)
+    free, g, trial = problem.goals.freedom, goal.goal, np.empty(PARAMETERS)
     for scale in SCALES:
         for parameter in range(PARAMETERS):
             step = scale * free.step[g, parameter]
@@ -559,9 +559,9 @@ def _reach_in_goal(problem: Problem, work: Workspace, goal: PlacedGoal) -> Float
 
     The first row is the pivot and the greatest distance from it; the others are the slabs.
     """
-    R_WG, p_WG = problem.goal_R[goal.state, goal.goal], problem.goal_p[goal.state, goal.goal]
+    R_WG, p_WG = problem.goals.R[goal.state, goal.goal], problem.goals.p[goal.state, goal.goal]
     pose_in_arm_base(problem, work, goal.torso, R_WG, p_WG)
-    R, p, reach = work.R_AG, work.p_AG, problem.freedom.reach
+    R, p, reach = work.R_AG, work.p_AG, problem.goals.freedom.reach
     found = np.empty((1 + len(reach.slabs), 4))
     for k in range(3):
         found[0, k] = 0.0

@@ -6,12 +6,12 @@ import numpy as np
 
 from tcs.kernel.analytic.ik import sample_joints, wrist_goal
 from tcs.kernel.analytic.solver import ArmSolver, is_outside
-from tcs.kernel.arrays import Chain, FloatArray
+from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import jit
 from tcs.kernel.five_joints.pairs import new_five_joint_solver, solve_turned
 from tcs.kernel.kinematics import pose_error, tool_pose
 from tcs.kernel.numeric.solutions import numeric_solutions
-from tcs.kernel.problem import Problem
+from tcs.kernel.problem import Problem, chain_of
 from tcs.kernel.six_joints.pairs import new_six_joint_solver
 from tcs.kernel.six_joints.solutions import solve_six_joints, within_limits
 
@@ -33,24 +33,24 @@ def postures_at(
         samples: Number of values of the free joint for an arm of seven joints with a closed form.
             For others of seven the curves of solutions are sampled at most 0.2 rad apart; arms of
             fewer joints have a finite number of postures, and all of them are returned.
-        may_turn: Whether the tool of an arm of five joints may be rotated about `Problem.turn`.
+        may_turn: Whether the tool of an arm of five joints may be rotated about
+            `Problem.goals.turn`.
 
     Returns:
         Joint angles [rad], shape (n, 7); n is 0 if no posture is found.
     """
     arm = problem.arm
-    if problem.joints < 7:
+    if problem.chain.joints < 7:
         return _finite_postures(problem, R_AG, p_AG, may_turn)
     if is_outside(arm):
-        chain = Chain(problem.chain_R, problem.chain_p, arm.lower, arm.upper)
-        return numeric_solutions(chain, R_AG, p_AG)
+        return numeric_solutions(chain_of(problem), R_AG, p_AG)
     found = np.empty((samples * len(arm.branches), 7))
     low, high = arm.lower[arm.free], arm.upper[arm.free]
     if np.isfinite(low):
         angles = np.linspace(low, high, samples)
     else:
         angles = np.linspace(-np.pi, np.pi, samples, endpoint=False)
-    count = _sampled_postures(arm, problem.chain_R, problem.chain_p, R_AG, p_AG, angles, found)
+    count = _sampled_postures(arm, problem.chain.R, problem.chain.p, R_AG, p_AG, angles, found)
     return found[:count]
 
 
@@ -59,7 +59,7 @@ def _finite_postures(
 ) -> FloatArray:
     """Return all postures of an arm of five or six joints as `postures_at` does."""
     R, p = np.array(R_AG, dtype=np.float64, order="C"), np.array(p_AG, dtype=np.float64)
-    if problem.joints == 5:
+    if problem.chain.joints == 5:
         turned = new_five_joint_solver(problem)
         solve_turned(turned, R, p)
         found = turned.solutions[: turned.kept[0]]

@@ -6,11 +6,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tcs.kernel.arrays import BoolArray, Chain, FloatArray, IntArray
+from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
 from tcs.kernel.collide import BOUND, CENTRE, COLUMNS, ROTATION
 from tcs.kernel.distances import DistanceTables
 from tcs.kernel.motion.link_poses import LANES
-from tcs.kernel.problem import Problem, travel
+from tcs.kernel.problem import Problem, chain_of, travel
 from tcs.kernel.rows import Rows
 
 FULL_TURN = 2.0 * np.pi
@@ -220,30 +220,30 @@ def torso_scene(problem: Problem, torso: int) -> MotionScene:
         torso: The torso level.
     """
     # The boxes around groups of shapes come after the shapes, and are left out.
-    count, others = len(problem.link_body), len(problem.body_body)
-    fixed = np.concatenate([problem.environment[0], problem.body_A[torso, :others]])
+    count, others = len(problem.links.body), len(problem.body.body)
+    fixed = np.concatenate([problem.environment.shapes[0], problem.body.shapes_A[torso, :others]])
     gap_fixed = np.concatenate(
-        [problem.gap_environment[:count], problem.gap_body[:count, :others]], axis=1
+        [problem.clearances.environment[:count], problem.clearances.body[:count, :others]], axis=1
     )
-    links = np.ascontiguousarray(problem.links[:count])
-    link_frame = np.ascontiguousarray(problem.link_frame[:count])
-    away = depth(link_frame, problem.coupled)
+    links = np.ascontiguousarray(problem.links.shapes[:count])
+    link_frame = np.ascontiguousarray(problem.links.frame[:count])
+    away = depth(link_frame, problem.chain.coupled)
     apart = away[:, None] > away
-    gaps = np.concatenate([gap_fixed, problem.gap_arm[:count, :count] * apart], axis=1)
+    gaps = np.concatenate([gap_fixed, problem.clearances.arm[:count, :count] * apart], axis=1)
     arm, other = np.nonzero(gaps > 0.0)
     number = np.concatenate([count + np.arange(len(fixed)), np.arange(count)])
     carrying = np.concatenate([np.zeros(len(fixed), np.int64), link_frame])
     pair = np.stack([arm, number[other], carrying[other]], axis=1)
     lower, upper = problem.arm.lower.copy(), problem.arm.upper.copy()
-    lower[: 7 - problem.joints] = upper[: 7 - problem.joints] = 0.0
-    slides = problem.chain_p[:7, 3].copy() if problem.chain_p.shape[1] > 3 else np.zeros(7)
-    farthest = _farthest(problem, slides, links, link_frame)
+    lower[: 7 - problem.chain.joints] = upper[: 7 - problem.chain.joints] = 0.0
+    slides = chain_of(problem).slides
+    farthest = _farthest(problem, links, link_frame)
     reach = np.where(slides > 0.0, slides, farthest)
     return MotionScene(
-        chain_R=problem.chain_R,
-        chain_p=problem.chain_p,
+        chain_R=problem.chain.R,
+        chain_p=problem.chain.p,
         slides=slides,
-        coupled=problem.coupled,
+        coupled=problem.chain.coupled,
         lower=lower,
         upper=upper,
         period=np.where(np.isfinite(lower) & np.isfinite(upper), 0.0, FULL_TURN),
@@ -255,9 +255,9 @@ def torso_scene(problem: Problem, torso: int) -> MotionScene:
         fixed=fixed,
         body=np.concatenate(
             [
-                problem.link_body + problem.environment_bodies,
-                problem.environment_body,
-                problem.body_body + problem.environment_bodies,
+                problem.links.body + problem.environment.bodies,
+                problem.environment.body,
+                problem.body.body + problem.environment.bodies,
             ]
         ),
         distances=problem.distances,
@@ -267,8 +267,8 @@ def torso_scene(problem: Problem, torso: int) -> MotionScene:
         root=np.arange(count),
         leaf_shape=np.zeros(0, np.int64),
         leaf_pair=np.zeros((0, len(fixed)), np.int64),
-        robot=problem.environment_bodies,
-        turn=problem.turn,
+        robot=problem.environment.bodies,
+        turn=problem.goals.turn,
         **pair_fields(links, fixed, pair, gaps[arm, other]),
     )
 
@@ -283,7 +283,7 @@ def placed(scene: MotionScene, problem: Problem, row: Rows) -> MotionScene:
         row: The configuration.
     """
     R_WA, p_WA = arm_base(problem, row)
-    environment = moved_shapes(problem.environment[row.state[0]], R_WA.T, -R_WA.T @ p_WA)
+    environment = moved_shapes(problem.environment.shapes[row.state[0]], R_WA.T, -R_WA.T @ p_WA)
     fixed = np.concatenate([environment, scene.fixed[len(environment) :]])
     always = scene.pair[: scene.first_pair[-1]]
     return scene._replace(fixed=fixed, centre=_centres(always, len(scene.links), fixed))
@@ -294,7 +294,7 @@ def arm_base(problem: Problem, row: Rows) -> tuple[FloatArray, FloatArray]:
     c, s, torso = np.cos(row.yaw[0]), np.sin(row.yaw[0]), row.torso[0]
     R_WB = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     p_WB = np.array([row.x[0], row.y[0], 0.0])
-    return R_WB @ problem.base_R[torso], p_WB + R_WB @ problem.base_p[torso]
+    return R_WB @ problem.arm_base.R[torso], p_WB + R_WB @ problem.arm_base.p[torso]
 
 
 def goal_from_arm_base(problem: Problem, row: Rows, goal: int) -> tuple[FloatArray, FloatArray]:
@@ -303,9 +303,9 @@ def goal_from_arm_base(problem: Problem, row: Rows, goal: int) -> tuple[FloatArr
     Of a goal that has several poses it is the first.
     """
     R_WA, p_WA = arm_base(problem, row)
-    state, pose = row.state[0], problem.poses_of(goal)[0]
-    R_AG = np.ascontiguousarray(R_WA.T @ problem.goal_R[state, pose])
-    return R_AG, R_WA.T @ (problem.goal_p[state, pose] - p_WA)
+    state, pose = row.state[0], problem.goals.poses_of(goal)[0]
+    R_AG = np.ascontiguousarray(R_WA.T @ problem.goals.R[state, pose])
+    return R_AG, R_WA.T @ (problem.goals.p[state, pose] - p_WA)
 
 
 def carriers(problem: Problem) -> IntArray:
@@ -313,7 +313,7 @@ def carriers(problem: Problem) -> IntArray:
 
     Shapes of the environment are grouped with no others, those of the robot by their mount.
     """
-    return np.concatenate([np.full(problem.environment_body.size, -1), problem.body_mount])
+    return np.concatenate([np.full(problem.environment.body.size, -1), problem.body.mount])
 
 
 def with_pairs(scene: MotionScene, kept: BoolArray | IntArray) -> MotionScene:
@@ -433,17 +433,14 @@ def depth(frame: IntArray, coupled: FloatArray) -> FloatArray:
     return found
 
 
-def _farthest(
-    problem: Problem, slides: FloatArray, links: FloatArray, link_frame: IntArray
-) -> FloatArray:
+def _farthest(problem: Problem, links: FloatArray, link_frame: IntArray) -> FloatArray:
     """Return how far from the origin of each link any point on or beyond it may be [m], (7,)."""
-    arm, p = problem.arm, problem.chain_p[:, :3]
-    steps = np.linalg.norm(p[:7], axis=1)
-    steps += travel(Chain(problem.chain_R, p, arm.lower, arm.upper, slides=slides))
+    chain = chain_of(problem)
+    steps = np.linalg.norm(chain.p[:7], axis=1) + travel(chain)
     spans = np.concatenate([[0.0], np.cumsum(steps)])
-    spans = np.append(spans, spans[problem.coupled[:, 0].astype(np.int64) + 1])
+    spans = np.append(spans, spans[problem.chain.coupled[:, 0].astype(np.int64) + 1])
     centre = np.linalg.norm(links[:, CENTRE : CENTRE + 3], axis=1)
-    away, found = depth(link_frame, problem.coupled), np.zeros(7)
+    away, found = depth(link_frame, problem.chain.coupled), np.zeros(7)
     for k in range(1, 8):
         out = spans[link_frame] - spans[k] + centre + links[:, BOUND]
         found[k - 1] = np.max(np.where(away >= k, out, 0.0), initial=0.0)

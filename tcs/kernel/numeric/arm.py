@@ -21,7 +21,7 @@ from tcs.kernel.cache import jit
 from tcs.kernel.kinematics import link_poses
 from tcs.kernel.lines import axis_distance
 from tcs.kernel.low_discrepancy import spread
-from tcs.kernel.problem import Problem
+from tcs.kernel.problem import Problem, chain_of
 
 SAMPLES = 1 << 18
 """Number of postures in the table."""
@@ -76,8 +76,7 @@ def numeric_arm(chain: Chain) -> NumericArm:
 
 def numeric_arm_of(problem: Problem) -> NumericArm:
     """Return the constants of a problem's arm."""
-    arm = problem.arm
-    return numeric_arm(Chain(problem.chain_R, problem.chain_p, arm.lower, arm.upper))
+    return numeric_arm(chain_of(problem))
 
 
 @cache

@@ -215,7 +215,7 @@ def bisect_contacts(
             point = int(middle)
             q = search.curves.q_now
             point_between(search.curves, point, middle - point, q)
-            link_poses(problem.chain_R, problem.chain_p, q, work.link_R, work.link_p)
+            link_poses(problem.chain.R, problem.chain.p, q, work.link_R, work.link_p)
             if pair_touches(problem, work, body_A, q, partner, i, j):
                 low = middle
             elif pair_touches(problem, work, body_A, q, other, k, m):

@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tcs.kernel.arrays import Chain, FloatArray, IntArray
+from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner
 from tcs.kernel.contacts import NO_CONTACT, arm_contact, at_goal
 from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.kinematics import copy_joints
-from tcs.kernel.problem import Problem
+from tcs.kernel.problem import Problem, chain_of
 from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED, TOO_FAR
 from tcs.kernel.six_joints.arm import SixJointArm, six_joint_arm
 from tcs.kernel.six_joints.solutions import MOST_SOLUTIONS, solve_six_joints, within_limits
@@ -37,12 +37,8 @@ class SixJointSolver(NamedTuple):
 
 def new_six_joint_solver(problem: Problem) -> SixJointSolver:
     """Return the solver of a problem's arm, with scratch memory for one worker."""
-    arm = problem.arm
-    p = problem.chain_p
-    slides = p[:7, 3].copy() if p.shape[1] > 3 else np.zeros(7)
-    chain = Chain(problem.chain_R, p[:, :3].copy(), arm.lower, arm.upper, problem.joints, slides)
     return SixJointSolver(
-        six_joint_arm(chain),
+        six_joint_arm(chain_of(problem)),
         np.empty((MOST_SOLUTIONS, 7)),
         np.zeros(1, np.int64),
         np.empty(MOST_SOLUTIONS),

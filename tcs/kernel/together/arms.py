@@ -48,14 +48,14 @@ class TwoArms:
         Raises:
             ArmClassError: If an arm has five joints.
         """
-        if first.joints == FEWEST_JOINTS or second.joints == FEWEST_JOINTS:
+        if first.chain.joints == FEWEST_JOINTS or second.chain.joints == FEWEST_JOINTS:
             raise ArmClassError(
                 "two arms at once need six or seven joints each, and one of them has five: leave "
                 "'together_with' out of the goals."
             )
         self.problems = (first, second)
         self.works = (new_workspace(first), new_workspace(second))
-        self.gaps = gaps_between(*scenes, first.link_groups, second.link_groups)
+        self.gaps = gaps_between(*scenes, first.links.groups, second.links.groups)
 
     def contacts(self, torsos: IntArray, first: FloatArray, second: FloatArray) -> IntArray:
         """Return the bodies of the two arms that touch, of several pairs of postures.
@@ -76,7 +76,7 @@ class TwoArms:
     def grippers_meet(self, bodies: tuple[int, int]) -> bool:
         """Return whether both bodies in contact are of the grippers, which the goals place."""
         return all(
-            np.all(problem.link_frame[: problem.link_body.size][problem.link_body == body] == 7)
+            np.all(problem.links.frame[: problem.links.body.size][problem.links.body == body] == 7)
             for problem, body in zip(self.problems, bodies, strict=True)
         )
 
@@ -119,7 +119,7 @@ class TwoArms:
         """Return free postures of an arm by itself at a goal, the best first, and measures."""
         problem, work = self.problems[k], self.works[k]
         parts = [known] if len(known) else []
-        for pose in problem.poses_of(goal):
+        for pose in problem.goals.poses_of(goal):
             parts += self._postures_at(problem, work, row, pose, samples)
         postures = np.concatenate(parts) if parts else np.empty((0, 7))
         measures = measures_of(problem, postures)
@@ -130,8 +130,8 @@ class TwoArms:
         self, problem: Problem, work: Workspace, row: Rows, pose: int, samples: int
     ) -> list[FloatArray]:
         """Return free postures of an arm by itself at the samples of a pose, shapes (n, 7)."""
-        free = problem.freedom
-        R, p = problem.goal_R[row.state[0], pose], problem.goal_p[row.state[0], pose]
+        free = problem.goals.freedom
+        R, p = problem.goals.R[row.state[0], pose], problem.goals.p[row.state[0], pose]
         offsets, form = np.zeros((1, 6)), np.zeros(15)
         if free.first.size:
             offsets, form = free.samples(pose), free.form[pose]
@@ -141,7 +141,7 @@ class TwoArms:
         for u in offsets:
             if not place_gripper_pose(problem, work, row, form, u, R, p):
                 continue
-            if problem.joints == 6:
+            if problem.chain.joints == 6:
                 tried = six_joint_postures(problem, work)
             else:
                 tried = postures_at(problem, work.R_AG, work.p_AG, samples)
@@ -188,7 +188,7 @@ def place_gripper_pose(
     if gripper_contact_at(problem, work, state, R, p) != NO_CONTACT:
         return False
     pose_in_arm_base(problem, work, torso, R, p)
-    return gripper_body_contact(problem, work, problem.body_A[torso]) == NO_CONTACT
+    return gripper_body_contact(problem, work, problem.body.shapes_A[torso]) == NO_CONTACT
 
 
 @jit
@@ -214,7 +214,7 @@ def keep_free(
     kept = 0
     work.last[0] = -1
     for n in range(len(postures)):
-        if arm_contact(problem, work, problem.body_A[torso], postures[n]) != NO_CONTACT:
+        if arm_contact(problem, work, problem.body.shapes_A[torso], postures[n]) != NO_CONTACT:
             continue
         if not at_goal(problem, work):
             continue
@@ -250,7 +250,7 @@ def contacts_of_pairs(
     """Fill the bodies of two arms that touch, of pairs of postures; see `TwoArms.contacts`."""
     a, b = unowned(owned_first), unowned(owned_second)
     work, other = unowned(owned_work), unowned(owned_other)
-    shapes, others = np.empty_like(a.links), np.empty_like(b.links)
+    shapes, others = np.empty_like(a.links.shapes), np.empty_like(b.links.shapes)
     R, p, rows = np.empty((3, 3)), np.empty(3), np.zeros(2, np.int64)
     for n in range(len(torsos)):
         _pose_of_second(a, b, torsos[n], R, p)
@@ -258,7 +258,7 @@ def contacts_of_pairs(
         _place_arm(b, other, second[n], R, p, others)
         bodies[n, 0] = bodies[n, 1] = -1
         if _arms_touch(a, shapes, b, others, gaps, rows):
-            bodies[n, 0], bodies[n, 1] = a.link_body[rows[0]], b.link_body[rows[1]]
+            bodies[n, 0], bodies[n, 1] = a.links.body[rows[0]], b.links.body[rows[1]]
 
 
 @jit
@@ -290,8 +290,8 @@ def best_free_pair(
     work, other = unowned(owned_work), unowned(owned_other)
     R, p, rows = np.empty((3, 3)), np.empty(3), np.zeros(2, np.int64)
     _pose_of_second(a, b, torso, R, p)
-    shapes = np.empty((len(first), a.links.shape[0], a.links.shape[1]))
-    others = np.empty((len(second), b.links.shape[0], b.links.shape[1]))
+    shapes = np.empty((len(first), len(a.links.shapes), a.links.shapes.shape[1]))
+    others = np.empty((len(second), len(b.links.shapes), b.links.shapes.shape[1]))
     for n in range(len(first)):
         _place_arm(a, work, first[n], np.eye(3), np.zeros(3), shapes[n])
     for n in range(len(second)):
@@ -308,11 +308,11 @@ def _pose_of_second(a: Problem, b: Problem, torso: int, R: FloatArray, p: FloatA
     for r in range(3):
         p[r] = 0.0
         for m in range(3):
-            p[r] += a.base_R[torso, m, r] * (b.base_p[torso, m] - a.base_p[torso, m])
+            p[r] += a.arm_base.R[torso, m, r] * (b.arm_base.p[torso, m] - a.arm_base.p[torso, m])
         for c in range(3):
             R[r, c] = 0.0
             for m in range(3):
-                R[r, c] += a.base_R[torso, m, r] * b.base_R[torso, m, c]
+                R[r, c] += a.arm_base.R[torso, m, r] * b.arm_base.R[torso, m, c]
 
 
 @inner
@@ -325,13 +325,13 @@ def _place_arm(
     shapes: FloatArray,
 ) -> None:
     """Fill the packed shapes of an arm and of its groups, its base being at the pose (R, p)."""
-    link_poses(problem.chain_R, problem.chain_p, q, work.link_R, work.link_p)
-    if len(problem.coupled):
+    link_poses(problem.chain.R, problem.chain.p, q, work.link_R, work.link_p)
+    if len(problem.chain.coupled):
         place_coupled_links(problem, work, q)
     link_R, link_p = np.empty((3, 3)), np.empty(3)
     last = -1
-    for i in range(len(problem.links)):
-        frame = problem.link_frame[i]
+    for i in range(len(problem.links.shapes)):
+        frame = problem.links.frame[i]
         if frame != last:
             for r in range(3):
                 link_p[r] = p[r]
@@ -342,7 +342,7 @@ def _place_arm(
                     for m in range(3):
                         link_R[r, c] += R[r, m] * work.link_R[frame, m, c]
             last = frame
-        move(link_R, link_p, problem.links, i, shapes, i)
+        move(link_R, link_p, problem.links.shapes, i, shapes, i)
 
 
 @inner
@@ -355,7 +355,7 @@ def _arms_touch(
     rows: IntArray,
 ) -> bool:
     """Return whether two arms with their shapes in one frame touch; fills `rows`."""
-    groups, other_groups = a.link_groups, b.link_groups
+    groups, other_groups = a.links.groups, b.links.groups
     first, second = groups.first, other_groups.first
     for g in range(len(first) - 1):
         box = first[-1] + g

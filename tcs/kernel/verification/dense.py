@@ -10,12 +10,12 @@ from tcs.kernel.analytic.pairs import measure_of, samples_hold_measure
 from tcs.kernel.analytic.samples import AIM, C2, ELBOW_ROUNDING, MAX_SAMPLES, ROW, WRIST
 from tcs.kernel.analytic.scratch import Search, fill_samples, measure_feasible, new_search, solve
 from tcs.kernel.analytic.solver import ArmSolver, is_outside
-from tcs.kernel.arrays import Chain, FloatArray, IntArray
+from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.base_pose import environment_in_arm_base, goal_in_arm_base, place_base
 from tcs.kernel.cache import inner, int_constant, jit
 from tcs.kernel.contacts import NO_CONTACT, arm_contact, at_goal, gripper_body_contact
 from tcs.kernel.dexterity.measures import measure_at
-from tcs.kernel.problem import Problem
+from tcs.kernel.problem import Problem, chain_of
 from tcs.kernel.rows import Rows
 from tcs.kernel.verification.free_scans import free_scans
 from tcs.kernel.verification.newton_solutions import newton_solutions, within
@@ -72,9 +72,9 @@ def dense_scans(
             a closed form.
         joints: Filled with the joint angles of each solution [rad], shape (n, 7).
     """
-    if problem.freedom.first.size or problem.first_pose.size:
+    if problem.goals.freedom.first.size or problem.goals.first_pose.size:
         return free_scans(problem, rows, pairs, samples, joints)
-    if problem.joints == 6:
+    if problem.chain.joints == 6:
         return six_joint_scans(problem, rows, pairs, joints)
     if is_outside(problem.arm):
         return numeric_dense_scans(problem, rows, pairs, STARTS, joints)
@@ -144,7 +144,7 @@ def _scan(
     samples, found, environment_placed = table.shape[1], 0, False
     step = table[0, 1] - table[0, 0]
     fast, added = np.empty((MAX_SAMPLES, 2)), np.zeros(len(arm.branches), np.int64)
-    body_A = problem.body_A[torso]
+    body_A = problem.body.shapes_A[torso]
     # Blocks share a sample, so that every two neighbours are compared.
     for start in range(0, samples - 1, MAX_SAMPLES - 1):
         count = min(MAX_SAMPLES, samples - start)
@@ -256,10 +256,8 @@ def six_joint_scans(
             with the environment, shape (n, 2).
         joints: Filled with the joint angles of each solution [rad], shape (n, 7).
     """
-    arm, work = problem.arm, new_workspace(problem)
-    p = problem.chain_p
-    slides = p[:7, 3].copy() if p.shape[1] > 3 else np.zeros(7)
-    chain = Chain(problem.chain_R, p[:, :3].copy(), arm.lower, arm.upper, problem.joints, slides)
+    work = new_workspace(problem)
+    chain = chain_of(problem)
     values = np.full(len(pairs), -1.0)
     for i, (row, goal) in enumerate(pairs):
         if not _place(problem, work, rows, row, goal):
@@ -279,7 +277,7 @@ def _place(
     state, torso = rows.state[row], rows.torso[row]
     place_base(problem, work, rows, row)
     goal_in_arm_base(problem, work, state, torso, goal)
-    if gripper_body_contact(problem, work, problem.body_A[torso]) != NO_CONTACT:
+    if gripper_body_contact(problem, work, problem.body.shapes_A[torso]) != NO_CONTACT:
         return False
     environment_in_arm_base(problem, work, torso)
     return True
@@ -298,7 +296,7 @@ def _best(
     best = -1.0
     for n in range(len(postures)):
         value = measure_at(problem, postures[n])
-        contact = arm_contact(problem, work, problem.body_A[torso], postures[n])
+        contact = arm_contact(problem, work, problem.body.shapes_A[torso], postures[n])
         if value > best and contact == NO_CONTACT and at_goal(problem, work):
             best = value
             joints[:] = postures[n]

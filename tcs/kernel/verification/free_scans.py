@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tcs.kernel.arrays import Chain, FloatArray, IntArray
+from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.base_pose import goal_in_arm_base, place_base
 from tcs.kernel.cache import jit
 from tcs.kernel.contacts import NO_CONTACT
@@ -22,10 +22,10 @@ from tcs.kernel.freedom.forms import (
     TILT,
 )
 from tcs.kernel.freedom.goals import FreeGoals, no_freedom
-from tcs.kernel.problem import Problem
+from tcs.kernel.problem import Problem, chain_of
 from tcs.kernel.rows import Rows
-from tcs.kernel.scores import Scores
-from tcs.kernel.sweep import gripper_contacts, score_rows
+from tcs.kernel.scores import REACHED
+from tcs.kernel.sweep import gripper_contacts, score
 from tcs.kernel.together.arms import keep_free, measures_of, place_gripper_pose
 from tcs.kernel.verification.newton_solutions import newton_solutions, within
 from tcs.kernel.views import unowned
@@ -85,26 +85,28 @@ def at_poses(problem: Problem, state: int, goal: int) -> Problem:
         goal: The goal.
     """
     drawn = []
-    for pose in problem.poses_of(goal):
+    for pose in problem.goals.poses_of(goal):
         R_GT, p_GT = np.eye(3)[None], np.zeros((1, 3))
-        if problem.freedom.first.size:
-            R_GT, p_GT = drawn_poses(problem.freedom.form[pose])
-        R_WG, p_WG = problem.goal_R[state, pose], problem.goal_p[state, pose]
+        if problem.goals.freedom.first.size:
+            R_GT, p_GT = drawn_poses(problem.goals.freedom.form[pose])
+        R_WG, p_WG = problem.goals.R[state, pose], problem.goals.p[state, pose]
         drawn.append((R_WG @ R_GT, p_WG + p_GT @ R_WG.T))
     R, p = (np.concatenate(parts) for parts in zip(*drawn, strict=True))
-    states = len(problem.goal_R)
+    states = len(problem.goals.R)
+    is_turned = problem.chain.joints == FEWEST_JOINTS
+    goals = problem.goals.at(np.repeat(R[None], states, axis=0), np.repeat(p[None], states, axis=0))
     return problem._replace(
-        first_pose=np.empty(0, np.int64),
-        goal_R=np.ascontiguousarray(np.repeat(R[None], states, axis=0)),
-        goal_p=np.ascontiguousarray(np.repeat(p[None], states, axis=0)),
-        freedom=_turning(problem, len(R)) if problem.joints == FEWEST_JOINTS else no_freedom(),
+        goals=goals._replace(
+            first_pose=np.empty(0, np.int64),
+            freedom=_turning(problem, len(R)) if is_turned else no_freedom(),
+        )
     )
 
 
 def _turning(problem: Problem, count: int) -> FreeGoals:
     """Return the freedom of goals at which an arm of five joints finds the angle about the axis."""
     form = np.zeros((count, COLUMNS + 6))
-    form[:, AXIS : AXIS + 3], form[:, FOLD] = problem.turn, 1.0
+    form[:, AXIS : AXIS + 3], form[:, FOLD] = problem.goals.turn, 1.0
     return no_freedom()._replace(
         form=form,
         turned=np.zeros(count, np.bool_),
@@ -119,7 +121,7 @@ def _turning(problem: Problem, count: int) -> FreeGoals:
         wrist=np.zeros((1, 3)),
         is_tried=np.ones(1, np.bool_),
         around=np.zeros((count, 4)),
-        reach=problem.freedom.reach,
+        reach=problem.goals.freedom.reach,
     )
 
 
@@ -139,13 +141,13 @@ def free_scans(
     for i, (row, goal) in enumerate(pairs):
         at = rows.at(slice(row, row + 1))
         state = int(at.state[0])
-        (first, *others) = problem.poses_of(int(goal))
-        is_one = problem.joints == FEWEST_JOINTS and not others
-        if is_one and not np.any(problem.freedom.step[first]):
+        (first, *others) = problem.goals.poses_of(int(goal))
+        is_one = problem.chain.joints == FEWEST_JOINTS and not others
+        if is_one and not np.any(problem.goals.freedom.step[first]):
             values[i] = five_joint_scan(problem, at, first, joints[i])
             continue
         posed = at_poses(problem, state, int(goal))
-        if problem.joints < 7:
+        if problem.chain.joints < 7:
             values[i], joints[i] = best_score(posed, at)
             continue
         clear = np.flatnonzero(gripper_contacts(posed)[state] == NO_CONTACT)
@@ -161,16 +163,10 @@ def free_scans(
 
 def best_score(posed: Problem, row: Rows) -> tuple[float, FloatArray]:
     """Return the greatest score over the goals of a problem, and its joints; -1 for none."""
-    count = posed.goal_p.shape[1]
-    scores = Scores(
-        np.empty((1, count), np.uint8),
-        np.empty((1, count), np.int32),
-        np.full((1, count), -1.0, np.float32),
-        np.zeros((1, count, 7), np.float32),
-    )
-    score_rows(posed, gripper_contacts(posed), row, scores)
-    best = int(np.argmax(scores.dexterity[0]))
-    return float(scores.dexterity[0, best]), scores.joints[0, best].astype(np.float64)
+    scores = score(posed, row)
+    values = np.where(scores.reason[0] == REACHED, scores.dexterity[0], -1.0)
+    best = int(np.argmax(values))
+    return float(values[best]), scores.joints[0, best].astype(np.float64)
 
 
 def five_joint_scan(problem: Problem, row: Rows, goal: int, joints: FloatArray) -> float:
@@ -182,19 +178,17 @@ def five_joint_scan(problem: Problem, row: Rows, goal: int, joints: FloatArray) 
     Args:
         problem: The scene and its goals, with an arm of five joints.
         row: An initial configuration.
-        goal: A goal that leaves the rotation about `Problem.turn` free, and nothing else.
+        goal: A goal that leaves the rotation about `Problem.goals.turn` free, and nothing else.
         joints: Filled with the joint angles of the posture [rad], shape (7,).
     """
-    arm, work, p = problem.arm, new_workspace(problem), problem.chain_p
-    slides = p[:7, 3].copy() if p.shape[1] > 3 else np.zeros(7)
-    chain = Chain(problem.chain_R, p[:, :3].copy(), arm.lower, arm.upper, problem.joints, slides)
-    turned = turned_chain(chain, problem.turn)
+    work = new_workspace(problem)
+    turned = turned_chain(chain_of(problem), problem.goals.turn)
     state, torso = int(row.state[0]), int(row.torso[0])
     _place(problem, work, row, goal)
-    best, R_WG, p_WG = -1.0, problem.goal_R[state, goal], problem.goal_p[state, goal]
+    best, R_WG, p_WG = -1.0, problem.goals.R[state, goal], problem.goals.p[state, goal]
     for solution in within(turned, newton_solutions(turned, work.R_AG.copy(), work.p_AG.copy())):
         u = np.array([-solution[6], 0.0, 0.0, 0.0, 0.0, 0.0])
-        form = problem.freedom.form[goal]
+        form = problem.goals.freedom.form[goal]
         if not place_gripper_pose(problem, work, row, form, u, R_WG, p_WG):
             continue
         posture = np.concatenate([np.zeros(2), solution[1:6]])[None]

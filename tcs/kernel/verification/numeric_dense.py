@@ -81,7 +81,7 @@ def _scan(
     state, torso = rows.state[row], rows.torso[row]
     place_base(problem, work, rows, row)
     goal_in_arm_base(problem, work, state, torso, goal)
-    body_A = problem.body_A[torso]
+    body_A = problem.body.shapes_A[torso]
     if gripper_body_contact(problem, work, body_A) != NO_CONTACT:
         return -1.0
     environment_in_arm_base(problem, work, torso)

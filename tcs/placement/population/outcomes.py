@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 from tcs.errors import TcsError
 from tcs.kernel.arrays import IntArray, SceneArrays
 from tcs.kernel.rows import Rows
-from tcs.kernel.sweep import gripper_contacts
 from tcs.model.people import Scale
 from tcs.model.scene import PeopleInScene, SceneSpec
 from tcs.model.tasks import load_task
@@ -24,6 +23,7 @@ from tcs.placement.robustness.body_collisions import counted_pairs, counted_rest
 from tcs.placement.robustness.error_model import Offsets
 from tcs.placement.robustness.perturbed_scenes import HandScenes, PerturbedScenes, Run
 from tcs.placement.robustness.trials import HandTrials, Progress, Trials
+from tcs.placement.scoring.scorer import Scorer
 from tcs.placement.scoring.together import Hands
 
 CHUNK = 500
@@ -229,5 +229,4 @@ def _evaluated(
 
 def _hand_scenes(hand: _Prepared, arrays: SceneArrays) -> HandScenes:
     """Return the states of one person's scene for one hand."""
-    problem = hand.problems.of(arrays)
-    return HandScenes(problem, gripper_contacts(problem), hand.goals)
+    return HandScenes(Scorer.of(hand.problems.of(arrays)), hand.goals)

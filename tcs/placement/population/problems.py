@@ -5,9 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray, SceneArrays
-from tcs.kernel.collide import pack
 from tcs.kernel.groups import with_group_rows
-from tcs.kernel.problem import TOUCH, UNCHECKED, Problem, arm_order, build_problem
+from tcs.kernel.problem import (
+    TOUCH,
+    UNCHECKED,
+    Problem,
+    arm_order,
+    build_problem,
+    with_environment,
+)
 
 
 class PersonProblems:
@@ -27,7 +33,7 @@ class PersonProblems:
         order = arm_order(arrays)
         self._pads = arrays.arm.pad[order], arrays.body.pad
         self._checked = arrays.arm_vs_environment[order], arrays.body_vs_environment
-        self._groups = problem.link_groups, problem.body_groups
+        self._groups = problem.links.groups, problem.body.groups
         self._margin = arrays.margin
 
     def of(self, arrays: SceneArrays) -> Problem:
@@ -36,18 +42,15 @@ class PersonProblems:
         Args:
             arrays: The same scene with the person; only its environment and goals are read.
         """
-        before, pad = self._problem, arrays.environment.pad
-        widest = max(before.widest_gap, 2.0 * float(pad.max(initial=0.0)))
-        arm, body = (self._gaps(group, pad) for group in range(2))
-        return before._replace(
-            environment=pack(arrays.environment),
-            gap_environment=arm,
-            gap_base=body,
-            widest_gap=widest,
-            arm_radius=before.arm_radius + (widest - before.widest_gap),
-            goal_R=np.array(arrays.goal_R),
-            goal_p=np.array(arrays.goal_p),
+        known, pad = self._problem.clearances, arrays.environment.pad
+        widest = max(known.widest, 2.0 * float(pad.max(initial=0.0)))
+        clearances = known._replace(
+            environment=self._gaps(0, pad),
+            base=self._gaps(1, pad),
+            widest=widest,
+            arm_radius=known.arm_radius + (widest - known.widest),
         )
+        return with_environment(self._problem, arrays)._replace(clearances=clearances)
 
     def _gaps(self, group: int, pad: FloatArray) -> FloatArray:
         """Return the distances that arm (0) or body (1) keep from the environment [m]."""

@@ -157,7 +157,7 @@ def _best(scorer: PoseScorer, scene: PoseScene, fineness: Fineness) -> list[Scor
     scores = scorer.score(values[few])
     counts = scores.reached.sum(axis=1)
     order = np.lexsort((-scores.dexterity.mean(axis=1), -counts))
-    goals = scorer.problem.goals
+    goals = scorer.goals.number
     if counts[order[0]] == goals:
         found = [ScoredBase(values[few[i]], *(array[i] for array in scores[:3])) for i in order]
     else:
@@ -172,10 +172,10 @@ def _refined(scorer: PoseScorer, starts: Sequence[tuple[int, ...]]) -> list[Scor
     The search sees a few tool poses; where others are missed from what it finds, it begins anew
     with more of them.
     """
-    goals, chosen = scorer.problem.goals, np.empty(0, dtype=np.int64)
+    goals, chosen = scorer.goals.number, np.empty(0, dtype=np.int64)
     missed = np.arange(goals)
     while True:
-        p, R = scorer.problem.goal_p[0, missed], scorer.problem.goal_R[0, missed]
+        p, R = scorer.goals.p[0, missed], scorer.goals.R[0, missed]
         chosen = np.union1d(chosen, missed[_far_apart(p, R)])
         search = LocalSearch(
             scorer.of_goals(chosen),
@@ -200,7 +200,7 @@ def _with_path(scorer: PoseScorer, bases: list[ScoredBase]) -> tuple[ScoredBase,
     for base in bases:
         served = np.flatnonzero(base.reached)
         row = single_row(*base.values[:3])
-        problem = scorer.of_goals(served).problem
+        problem = scorer.of_goals(served).scorer.problem
         path = joint_path(problem, row, base.joints[served].astype(np.float64))
         if path is not None:
             return base, path
@@ -219,7 +219,7 @@ def _screened(
         alive = np.arange(len(values))
     reached = np.zeros(len(values))
     dexterity_sum = np.zeros(len(values))
-    for goal in _far_apart(scorer.problem.goal_p[0], scorer.problem.goal_R[0]):
+    for goal in _far_apart(scorer.goals.p[0], scorer.goals.R[0]):
         if alive.size <= fineness.screened:
             break
         found = scorer.of_goals([goal]).score(values[alive])
@@ -252,7 +252,7 @@ def _within_reach(scorer: PoseScorer, scene: PoseScene, values: FloatArray) -> B
         [values[:, 0] + c * x - s * y, values[:, 1] + s * x + c * y, np.full(len(values), z)],
         axis=1,
     )
-    distance = np.linalg.norm(shoulder[:, None] - scorer.problem.goal_p[0], axis=2)
+    distance = np.linalg.norm(shoulder[:, None] - scorer.goals.p[0], axis=2)
     return np.asarray(np.all(distance <= scene.reach, axis=1))
 
 

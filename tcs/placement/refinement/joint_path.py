@@ -69,7 +69,7 @@ def joint_path(problem: Problem, row: Rows, through: FloatArray | None = None) -
 def _layers(problem: Problem, row: Rows, through: FloatArray | None) -> list[FloatArray]:
     """Return postures at each goal, shapes (n, 7)."""
     layers = []
-    for g in range(problem.goals):
+    for g in range(problem.goals.number):
         found = postures_at(problem, *goal_from_arm_base(problem, row, g), SAMPLES)
         found = found[:: max(1, -(-len(found) // MOST_POSTURES))]
         if through is not None:

@@ -9,14 +9,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
-from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.rows import Rows
 from tcs.kernel.scores import Scores, new_scores
-from tcs.kernel.sweep import gripper_contacts, score_rows
 from tcs.model.grid import ROBOT_AXES, Grid
 from tcs.model.scene import LoweredScene, Scene, environment_at, torso_at
 from tcs.placement.constraints import Footprint
@@ -25,6 +23,7 @@ from tcs.placement.scoring.hands import HandScores, best_of_hands
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.kernel_start import warm_up
 from tcs.placement.scoring.rebuild import rebuild_scenes
+from tcs.placement.scoring.scorer import Scorer
 from tcs.placement.scoring.sweep import name_contacts
 from tcs.placement.scoring.together import Hands, together_at
 from tcs.placement.store import APPROACH, ScoreFile
@@ -217,21 +216,8 @@ class PointScorer:
 
     def _scores_of(self, hand: ScoredHand, problem: Problem, at: Rows) -> Scores:
         """Return the scores of configurations with one hand."""
-        grippers = gripper_contacts(problem)
         approaches = None if hand.lines is None else ApproachScorer(problem, hand.lines)
-        found = new_scores(len(at.state), problem.goals)
-
-        def score_batch(start: int) -> None:
-            part = slice(start, start + BATCH)
-            scores = found.part(part)
-            score_rows(problem, grippers, at.at(part), scores)
-            if approaches is not None:
-                approaches.score_rows(problem, at.at(part), scores)
-
-        Parallel(n_jobs=self.jobs, prefer="threads")(
-            delayed(score_batch)(start) for start in range(0, len(at.state), BATCH)
-        )
-        return found
+        return Scorer.of(problem, approaches).score(at, self.jobs)
 
     def _problem(self, hand: ScoredHand, states: FloatArray, levels: FloatArray) -> Problem:
         """Return the kernel's problem of environment states and torso heights."""

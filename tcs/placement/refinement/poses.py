@@ -7,13 +7,10 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from joblib import Parallel, delayed
 
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.problem import Problem, build_problem
+from tcs.kernel.problem import Goals, Problem, build_problem
 from tcs.kernel.rows import Rows
-from tcs.kernel.scores import new_scores
-from tcs.kernel.sweep import gripper_contacts, score_rows
 from tcs.model.grid import Grid
 from tcs.model.robots import RobotFile
 from tcs.model.scene import EMPTY_ENVIRONMENT, Scene, SceneSpec, lower
@@ -21,10 +18,9 @@ from tcs.placement.constraints import Obstacle
 from tcs.placement.refinement.points import PointScores
 from tcs.placement.scoring.kernel_start import warm_up
 from tcs.placement.scoring.obstacles import with_obstacles
+from tcs.placement.scoring.scorer import Scorer
 from tcs.placement.tables import Reason
 
-BATCH = 64
-"""Most base poses that a thread scores at a time."""
 SINGLE = {"start": 0.0, "step": 0.0, "count": 1}
 
 
@@ -32,10 +28,8 @@ SINGLE = {"start": 0.0, "step": 0.0, "count": 1}
 class PoseScorer:
     """Scores base poses of a robot among boxes for poses of its tool, at one torso height."""
 
-    problem: Problem
+    scorer: Scorer
     """The scene, with the tool poses as goals."""
-    grippers: IntArray
-    """Contacts of the gripper with the boxes at each goal, shape (1, G)."""
     grid: Grid
     """The base poses that the search starts from."""
     jobs: int
@@ -44,38 +38,28 @@ class PoseScorer:
     @classmethod
     def of(cls, scene: PoseScene, poses: FloatArray, grid: Grid, jobs: int) -> Self:
         """Return the scorer of tool poses in W, shape (G, 4, 4)."""
-        problem = scene.problem._replace(
-            goal_R=np.ascontiguousarray(poses[None, :, :3, :3]),
-            goal_p=np.ascontiguousarray(poses[None, :, :3, 3]),
-        )
-        return cls(problem, gripper_contacts(problem), grid, jobs)
+        problem = scene.problem.at_poses(poses[None, :, :3, :3], poses[None, :, :3, 3])
+        return cls(Scorer.of(problem), grid, jobs)
+
+    @property
+    def goals(self) -> Goals:
+        """The tool poses."""
+        return self.scorer.problem.goals
 
     def of_goals(self, goals: Sequence[int] | IntArray) -> Self:
         """Return the scorer of some of the goals."""
         chosen = np.asarray(goals, dtype=np.int64)
-        problem = self.problem._replace(
-            goal_R=np.ascontiguousarray(self.problem.goal_R[:, chosen]),
-            goal_p=np.ascontiguousarray(self.problem.goal_p[:, chosen]),
-        )
-        grippers = np.ascontiguousarray(self.grippers[:, chosen])
-        return type(self)(problem, grippers, self.grid, self.jobs)
+        R, p = self.goals.R[:, chosen], self.goals.p[:, chosen]
+        problem = self.scorer.problem.at_poses(R, p)
+        grippers = np.ascontiguousarray(self.scorer.grippers[:, chosen])
+        return type(self)(Scorer(problem, grippers), self.grid, self.jobs)
 
     def score(self, points: FloatArray) -> PointScores:
         """Return the scores of base poses."""
-        count, goals = len(points), self.problem.goals
         x, y, yaw = points[:, :3].T
-        one = np.zeros(count, np.int64)
-        rows, found = Rows(one, x, y, yaw, one), new_scores(count, goals)
-
-        def score_batch(start: int) -> None:
-            part = slice(start, start + BATCH)
-            score_rows(self.problem, self.grippers, rows.at(part), found.part(part))
-
-        Parallel(n_jobs=self.jobs, prefer="threads")(
-            delayed(score_batch)(start) for start in range(0, count, BATCH)
-        )
+        one = np.zeros(len(points), np.int64)
+        found = self.scorer.score(Rows(one, x, y, yaw, one), self.jobs)
         reached = found.reason == Reason.REACHED
-        found.dexterity[~reached], found.joints[~reached] = 0.0, 0.0
         hand = np.zeros(reached.shape, np.uint8)
         return PointScores(reached, found.dexterity, found.joints, hand)
 
@@ -108,6 +92,6 @@ class PoseScene:
         lowered = lower(scene, None, grid)
         problem = build_problem(lowered.arrays, measure)
         warm_up(problem)
-        reach = float(np.linalg.norm(problem.chain_p[1:], axis=1).sum())
-        offset = float(np.linalg.norm(problem.chain_p[0]))
-        return cls(problem, reach + offset, problem.base_p[0])
+        reach = float(np.linalg.norm(problem.chain.p[1:], axis=1).sum())
+        offset = float(np.linalg.norm(problem.chain.p[0]))
+        return cls(problem, reach + offset, problem.arm_base.p[0])

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.kernel.problem import Problem, build_problem, with_environment
 from tcs.kernel.rows import Rows
-from tcs.kernel.sweep import blocked_grippers, gripper_contacts
+from tcs.kernel.sweep import blocked_grippers
 from tcs.model.grid import ROBOT_AXES
 from tcs.model.scene import environment_at, torso_at
 from tcs.placement.robustness.displacements import displaced, samples_of
@@ -22,6 +22,7 @@ from tcs.placement.robustness.error_model import Offsets
 from tcs.placement.robustness.perturbed_scenes import HandScenes, PerturbedScenes, Run
 from tcs.placement.robustness.trials import HandTrials, Trials
 from tcs.placement.scoring.approaches import ApproachScorer
+from tcs.placement.scoring.scorer import Scorer
 from tcs.placement.tables import Reason
 
 BATCH = 50
@@ -40,7 +41,7 @@ class PerturbedPoints:
     """Errors of the joints, shapes (samples,)."""
     jobs: int
     """Number of threads; the result does not depend on it."""
-    environments: dict[tuple[Any, ...], HandScenes] = field(default_factory=dict, repr=False)
+    environments: dict[tuple[Any, ...], Scorer] = field(default_factory=dict, repr=False)
     """The states of the environment that were evaluated last, in all samples; the robot in them is
     in some state."""
 
@@ -97,7 +98,7 @@ class PerturbedPoints:
         measure = str(self.trials.file.metadata["measure"])
         for hand in self.trials.hands:
             problem = build_problem(hand.lowered.arrays, measure)
-            blocked = blocked_grippers(self._scenes(hand, problem, dict(state)).problem)
+            blocked = blocked_grippers(self._scorer(hand, problem, dict(state)).problem)
             free[:, list(hand.goals)] |= ~blocked
         return free
 
@@ -114,7 +115,7 @@ class PerturbedPoints:
             nominal = {axis.name: v for axis, v in zip(axes, at.tolist(), strict=True)}
             scenes = PerturbedScenes(
                 tuple(
-                    self._scenes(hand, robot, nominal)._replace(approaches=approaches)
+                    HandScenes(self._scorer(hand, robot, nominal, approaches), hand.goals)
                     for hand, (robot, approaches) in zip(trials.hands, robots, strict=True)
                 ),
                 trials.together,
@@ -124,8 +125,14 @@ class PerturbedPoints:
                     run = Run(int(i), start, min(start + BATCH, self.samples))
                     yield _Part(scenes, poses, run)
 
-    def _scenes(self, hand: HandTrials, robot: Problem, state: dict[str, float]) -> HandScenes:
-        """Return one state of the environment in all samples, for one hand.
+    def _scorer(
+        self,
+        hand: HandTrials,
+        robot: Problem,
+        state: dict[str, float],
+        approaches: ApproachScorer | None = None,
+    ) -> Scorer:
+        """Return the scorer of one state of the environment in all samples, for one hand.
 
         Its arrays take a call of Drake for each sample: the last states are kept.
         """
@@ -142,13 +149,14 @@ class PerturbedPoints:
             problem = with_environment(
                 robot, environment_at(hand.lowered, hand.scene, hand.job.task, samples)
             )
-            known = HandScenes(problem, gripper_contacts(problem), hand.goals)
+            known = Scorer.of(problem)
             while self.environments and len(self.environments) * self.samples >= KEPT_SAMPLES:
                 self.environments.pop(next(iter(self.environments)))
         self.environments[key] = known
         of = known.problem
-        problem = robot._replace(environment=of.environment, goal_R=of.goal_R, goal_p=of.goal_p)
-        return known._replace(problem=problem)
+        goals = robot.goals._replace(R=of.goals.R, p=of.goals.p)
+        problem = robot._replace(environment=of.environment, goals=goals)
+        return Scorer(problem, known.grippers, approaches)
 
 
 def _robot_at(

@@ -11,14 +11,10 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from tcs.errors import TcsError
-from tcs.kernel.arrays import IntArray
 from tcs.kernel.dexterity import ANY_SOLUTION
-from tcs.kernel.problem import Problem
 from tcs.kernel.rows import Rows
-from tcs.kernel.scores import Scores, new_scores
-from tcs.kernel.sweep import score_rows
-from tcs.placement.scoring.approaches import ApproachScorer
 from tcs.placement.scoring.hands import HandScores, best_of_hands
+from tcs.placement.scoring.scorer import Scorer
 from tcs.placement.scoring.together import Hands, together_at
 from tcs.placement.tables import Reason
 
@@ -38,22 +34,10 @@ class Run(NamedTuple):
 class HandScenes(NamedTuple):
     """One state of the environment in several samples, as kernel arrays, for one hand."""
 
-    problem: Problem
+    scorer: Scorer
     """Each sample is a state of the environment."""
-    grippers: IntArray
-    """Contacts between gripper and environment at each goal."""
     goals: Sequence[int]
     """Numbers of the goals that the hand may serve."""
-    approaches: ApproachScorer | None = None
-    """Scores the approaches of the goals; None to score all postures."""
-
-    def scores(self, rows: Rows) -> Scores:
-        """Return the scores of rows, computed by the code that scores a grid."""
-        scores = new_scores(len(rows.state), self.problem.goals)
-        score_rows(self.problem, self.grippers, rows, scores)
-        if self.approaches is not None:
-            self.approaches.score_rows(self.problem, rows, scores)
-        return scores
 
     @property
     def for_reasons(self) -> HandScenes:
@@ -62,9 +46,11 @@ class HandScenes(NamedTuple):
         With approach it has to be: from another posture some approaches through narrow windows are
         not found.
         """
-        if self.approaches is not None:
+        problem, grippers, approaches = self.scorer
+        if approaches is not None:
             return self
-        return self._replace(problem=self.problem._replace(measure=ANY_SOLUTION))
+        any_solution = Scorer(problem._replace(measure=ANY_SOLUTION), grippers)
+        return self._replace(scorer=any_solution)
 
 
 class PerturbedScenes(NamedTuple):
@@ -78,9 +64,9 @@ class PerturbedScenes(NamedTuple):
         """Return the scores of one run, each goal by the best hand."""
         samples = np.arange(run.start, run.stop)
         rows = poses.at(np.full(samples.size, run.row))._replace(state=samples)
-        parts = [hand.scores(rows) for hand in self.hands]
+        parts = [hand.scorer.score(rows) for hand in self.hands]
         if self.together is not None and self.together.pairs:
-            problems = tuple(hand.problem for hand in self.hands)
+            problems = tuple(hand.scorer.problem for hand in self.hands)
             together_at(parts, dataclasses.replace(self.together, problems=problems), rows)
         return best_of_hands(parts, [hand.goals for hand in self.hands])
 

@@ -18,7 +18,6 @@ from tcs.files.blocks import BlockFolder, Blocks, opened_if
 from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import Rows
-from tcs.kernel.sweep import gripper_contacts
 from tcs.model.grid import Grid
 from tcs.model.scene import ErrorDistribution, LoweredScene, Scene, environment_at
 from tcs.model.tasks import Task
@@ -36,6 +35,7 @@ from tcs.placement.scoring.hands import HandScores
 from tcs.placement.scoring.job import Job, whole_task
 from tcs.placement.scoring.kernel_start import KernelStart
 from tcs.placement.scoring.rebuild import rebuild_scenes
+from tcs.placement.scoring.scorer import Scorer
 from tcs.placement.scoring.together import Hands
 from tcs.placement.store import APPROACH, ScoreFile, StateTables
 from tcs.placement.tables import Reason
@@ -80,7 +80,7 @@ class HandTrials:
         arrays = environment_at(self.lowered, self.scene, self.job.task, _states(positions))
         arrays = arrays._replace(body_vs_environment=self.body_pairs)
         problem = build_problem(arrays, measure)
-        return HandScenes(problem, gripper_contacts(problem), self.goals, self.approaches)
+        return HandScenes(Scorer.of(problem, self.approaches), self.goals)
 
     @cached_property
     def approaches(self) -> ApproachScorer | None:

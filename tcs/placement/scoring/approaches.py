@@ -141,7 +141,7 @@ class ApproachScorer:
         )
 
     def _no_pairs(self) -> ReachedPairs:
-        return _pairs_of(new_scores(0, self.problem.goals))
+        return _pairs_of(new_scores(0, self.problem.goals.number))
 
     def score(
         self,

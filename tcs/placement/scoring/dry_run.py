@@ -12,12 +12,12 @@ import numpy as np
 from tcs.files.compression import compress
 from tcs.files.mapped import LEAST_BYTES
 from tcs.kernel.problem import build_problem
-from tcs.kernel.sweep import gripper_contacts
 from tcs.placement.scoring.approaches import ApproachScorer, approach_lines, choose_approach
 from tcs.placement.scoring.blocks import BLOCK, Block
 from tcs.placement.scoring.engines import SLICE, Part, Work
 from tcs.placement.scoring.job import Job, whole_task
 from tcs.placement.scoring.kernel_start import warm_up
+from tcs.placement.scoring.scorer import Scorer
 
 SAMPLES = 24
 """Slices that are scored, spread evenly over the grid. Environment states and base positions differ
@@ -83,7 +83,7 @@ def estimate(
         problem = build_problem(lowered.arrays, measure)
         scorer = ApproachScorer(problem, approach_lines(job)) if choice.is_scored else None
         warm_up(problem, approaches=scorer)
-        work = Work(problem, lowered.grid, gripper_contacts(problem))
+        work = Work(Scorer.of(problem), lowered.grid)
         size = job.scored_grid.size
         starts = np.unique(np.linspace(0, max(0, size - SLICE), slices).astype(int))
         scored = [

@@ -12,8 +12,7 @@ from tcs.kernel.cache import announced
 from tcs.kernel.problem import Problem
 from tcs.kernel.quick_flags import quicken_flags
 from tcs.kernel.rows import no_rows
-from tcs.kernel.scores import new_scores
-from tcs.kernel.sweep import gripper_contacts, score_rows
+from tcs.kernel.sweep import score
 from tcs.placement.scoring.approaches import ApproachScorer
 
 ANALYTIC, NUMERIC = "analytic", "numeric"
@@ -49,7 +48,7 @@ class KernelStart:
 
 def ik_of(problem: Problem) -> str:
     """Return the inverse kinematics of the problem's arm: ANALYTIC or NUMERIC."""
-    return NUMERIC if problem.joints == 7 and is_outside(problem.arm) else ANALYTIC
+    return NUMERIC if problem.chain.joints == 7 and is_outside(problem.arm) else ANALYTIC
 
 
 def warm_up(
@@ -66,8 +65,7 @@ def warm_up(
     quicken_flags()
     with announced(on_compile):
         with nullcontext() if approaches is None else approaches.compiled_beside():
-            nothing = new_scores(0, problem.goals)
-            score_rows(problem, gripper_contacts(problem), no_rows(), nothing)
+            score(problem, no_rows())
         if approaches is not None:
             approaches.warm_up()
     return time.perf_counter() - begun

@@ -18,13 +18,13 @@ from tcs.files.mapped import chunks, large_zeros, release
 from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.scores import JOINTS
-from tcs.kernel.sweep import gripper_contacts
 from tcs.model.scene import LoweredScene
 from tcs.placement.scoring.approach_pass import GridScores, score_grid
 from tcs.placement.scoring.approaches import ApproachScorer
 from tcs.placement.scoring.blocks import BLOCK, Block, Kept, key_of
 from tcs.placement.scoring.engines import Part, ScoringEngine, Threads, Work
 from tcs.placement.scoring.kernel_start import KernelStart, ik_of
+from tcs.placement.scoring.scorer import Scorer
 from tcs.placement.scoring.shared_blocks import Manifest, Shared, joined, with_goals
 from tcs.placement.tables import ScoreTable
 
@@ -97,7 +97,7 @@ def sweep(
     problem = build_problem(lowered.arrays, measure)
     scorer = None if approaches is None else ApproachScorer(problem, approaches)
     start = KernelStart(lambda: [problem], on_compile, scorer)
-    size, goals = lowered.grid.size, problem.goals
+    size, goals = lowered.grid.size, problem.goals.number
     begun = time.perf_counter()
     reason: NDArray[np.uint8] = large_zeros((size, goals), np.uint8)
     contact: NDArray[Any] = large_zeros((size, goals), _code_type(problem))
@@ -111,7 +111,7 @@ def sweep(
         if some_goals is not None:
             arrays = with_goals(lowered, some_goals).arrays
             of_goals = build_problem(arrays, measure)
-        return Work(of_goals, lowered.grid, gripper_contacts(of_goals), excluded)
+        return Work(Scorer.of(of_goals), lowered.grid, excluded)
 
     with (
         _opened(blocks, problem, lambda: Manifest.of(lowered, measure, excluded)) as found,
@@ -192,7 +192,7 @@ def _opened(
 
 def _kept(opened: Blocks, problem: Problem) -> Kept:
     """Return the blocks of a problem in their folder."""
-    goals = problem.goals
+    goals = problem.goals.number
     return Kept(opened, goals=goals, joints=JOINTS, contacts=_codes(problem))
 
 
@@ -264,7 +264,7 @@ def _reached(reason: NDArray[np.uint8]) -> int:
 
 def _codes(problem: Problem) -> int:
     """Return the number of contact codes."""
-    return int(problem.robot_bodies * (problem.environment_bodies + problem.robot_bodies))
+    return int(problem.robot_bodies * (problem.environment.bodies + problem.robot_bodies))
 
 
 def _code_type(problem: Problem) -> type[np.int16] | type[np.int32]:
@@ -276,7 +276,7 @@ def name_contacts(
     contact: NDArray[Any], lowered: LoweredScene, problem: Problem
 ) -> tuple[tuple[str, str], ...]:
     """Replace contact codes, in place, by indices into the returned pairs of names."""
-    others = problem.environment_bodies + problem.robot_bodies
+    others = problem.environment.bodies + problem.robot_bodies
     both = (*lowered.environment_bodies, *lowered.robot_bodies)
     # One entry per code; NO_CONTACT (-1) indexes the last one.
     occurs = np.zeros(_codes(problem) + 1, dtype=np.bool_)

@@ -113,7 +113,7 @@ def test_an_obstacle_on_the_line_alone_blocks_the_approach_and_is_named(scene, s
         problem = build_problem(more)
         score_approaches(problem, lines(more), grid_rows(GRID), here)
         assert here.reason[0] == APPROACH_BLOCKED
-        bodies = problem.environment_bodies + problem.robot_bodies
+        bodies = problem.environment.bodies + problem.robot_bodies
         assert divmod(int(here.contact[0]), bodies) == (5, body)
         flipped += 1
         if flipped == 2:

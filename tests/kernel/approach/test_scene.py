@@ -17,7 +17,7 @@ from tests.reference.kinematics import link_poses
 def needed_at(problem, torso):
     """Return the pairs of the robot's own shapes that can touch at a torso level."""
     scene = torso_scene(problem, torso)
-    own = scene.body[scene.pair[:, 1]] >= problem.environment_bodies
+    own = scene.body[scene.pair[:, 1]] >= problem.environment.bodies
     needed = needed_pairs(scene, own) & own
     return set(map(tuple, scene.pair[needed, :2].tolist()))
 
@@ -25,12 +25,12 @@ def needed_at(problem, torso):
 def test_pairs_that_touch_at_another_torso_level_are_kept():
     chain = drake_arm("pr2 left").chain
     problem = build_problem(toy_scene(chain, 0))
-    body = problem.body_A.copy()
+    body = problem.body.shapes_A.copy()
     # At the first level everything around the arm is far away, at the second where link 2 is.
     body[0, :, CENTRE] += 9.0
     body[1, :, CENTRE : CENTRE + 3] = link_poses(chain, np.zeros(7))[1][1]
     # Two joints decide whether shapes of link 2 and fixed ones can touch.
-    frame = np.where(problem.link_frame == 4, 2, problem.link_frame)
+    frame = np.where(problem.links.frame == 4, 2, problem.links.frame)
     problem = problem._replace(body_A=body, link_frame=frame)
     first, second = needed_at(problem, 0), needed_at(problem, 1)
     assert second - first

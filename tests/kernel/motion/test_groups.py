@@ -136,7 +136,7 @@ def test_a_scene_is_placed_at_every_configuration(many, chain, rng):
     problem = build_problem(many)
     grid = toy_grid()
     judged = []
-    for torso in range(len(problem.base_R)):
+    for torso in range(len(problem.arm_base.R)):
         scene = grouped(torso_scene(problem, torso))
         # Of both states of the environment, far from each other.
         for h in (torso, grid.size // 2 + 4 * grid.torso_levels + torso):
@@ -182,20 +182,20 @@ def test_shapes_of_the_base_are_in_boxes_at_every_torso_level(many, chain, rng):
     problem = build_problem(scene)
     lines = approach_scene(problem)
     arm = len(lines.motion.links)
-    shift = arm + problem.environment_body.size
-    first = shift + len(problem.body_body)
+    shift = arm + problem.environment.body.size
+    first = shift + len(problem.body.body)
     assert first < arm + len(lines.motion.fixed)
-    assert len(problem.base_R) > 1
+    assert len(problem.arm_base.R) > 1
     for n in range(first, arm + len(lines.motion.fixed)):
         members = [i - shift for i in shapes_in(lines.motion, n)]
         assert members
-        for torso in range(len(problem.base_R)):
+        for torso in range(len(problem.arm_base.R)):
             still = lines.motion.fixed[n - arm]
             box = np.concatenate([lines.moved[torso, lines.moving == n], still[None]])[0]
-            for row in problem.body_A[torso, members]:
+            for row in problem.body.shapes_A[torso, members]:
                 beyond = (extremes(row) - box[CENTRE : CENTRE + 3]) @ box[ROTATION:].reshape(3, 3)
                 assert np.all(np.abs(beyond) <= box[SIZE : SIZE + 3])
-    for torso in range(len(problem.base_R)):
+    for torso in range(len(problem.arm_base.R)):
         plain, at = torso_scene(problem, torso), rows_at(toy_grid(), [torso])
         of_base = placed(grouped(plain, carriers(problem)), problem, at)
         plain = placed(plain, problem, at)

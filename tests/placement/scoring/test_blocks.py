@@ -207,7 +207,7 @@ def scored_goals(monkeypatch):
     counts, scores_of = [], Work.score
 
     def counted(work, part):
-        counts.append(work.problem.goal_p.shape[1])
+        counts.append(work.problem.goals.p.shape[1])
         return scores_of(work, part)
 
     monkeypatch.setattr(Work, "score", counted)

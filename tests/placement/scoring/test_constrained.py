@@ -91,14 +91,14 @@ def test_explanation_names_the_constraint(forbidden):
 
 def test_the_kernel_scores_no_more_than_needed(forbidden, small_job, monkeypatch):
     calls = []
-    module = __import__("tcs.placement.scoring.engines.work", fromlist=["score_rows"])
-    real = module.score_rows
+    module = __import__("tcs.placement.scoring.scorer", fromlist=["score"])
+    real = module.score
 
-    def counted(problem, grippers, rows, scores):
-        calls.append(len(rows.state))
-        real(problem, grippers, rows, scores)
+    def counted(problem, rows, grippers):
+        calls.append(rows.number)
+        return real(problem, rows, grippers)
 
-    monkeypatch.setattr(module, "score_rows", counted)
+    monkeypatch.setattr(module, "score", counted)
     scene = small_job.scene()
     out = np.zeros(small_job.grid.size, dtype=np.bool_)
     out[: small_job.grid.size // 2] = True

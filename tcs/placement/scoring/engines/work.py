@@ -18,11 +18,10 @@ from tcs.errors import TcsError
 from tcs.kernel import cache
 from tcs.kernel.arrays import GridArrays
 from tcs.kernel.contacts import NO_CONTACT
-from tcs.kernel.problem import Problem
 from tcs.kernel.rows import grid_rows
-from tcs.kernel.scores import Scores, new_scores
-from tcs.kernel.sweep import score_rows
+from tcs.kernel.scores import Scores, joined, new_scores
 from tcs.placement.scoring.blocks import Block
+from tcs.placement.scoring.scorer import Scorer
 from tcs.placement.tables import Reason
 
 SLICE = 1024
@@ -40,39 +39,32 @@ class Part(NamedTuple):
 class Work(NamedTuple):
     """A grid to score."""
 
-    problem: Problem
+    scorer: Scorer
     """The scene and its goals."""
     grid: GridArrays
     """The configurations."""
-    grippers: NDArray[np.int64]
-    """Contacts of the gripper at the goals, from `tcs.kernel.sweep.gripper_contacts`."""
     excluded: NDArray[np.bool_] | None = None
     """Configurations that are not scored, shape (configurations,); None for none."""
 
     def score(self, part: Part) -> Block:
         """Return the scores of a part."""
         slices = [
-            self._score_rows(begin, min(begin + SLICE, part.stop))
+            self._score(begin, min(begin + SLICE, part.stop))
             for begin in range(part.start, part.stop, SLICE)
         ]
-        reason, contact, dexterity, joints = map(np.concatenate, zip(*slices, strict=True))
+        reason, contact, dexterity, joints = joined(slices)
         # Only reached pairs, about one in ten, have joints to keep.
         return Block(reason, contact, dexterity, joints[reason == Reason.REACHED])
 
-    def _score_rows(self, start: int, stop: int) -> Scores:
+    def _score(self, start: int, stop: int) -> Scores:
         """Return the scores of configurations start <= h < stop."""
         rows = grid_rows(self.grid, start, stop)
-        goals = self.problem.goals
         if self.excluded is None:
-            scores = new_scores(stop - start, goals)
-            score_rows(self.problem, self.grippers, rows, scores)
-            return scores
+            return self.scorer.score(rows)
         out = self.excluded[start:stop]
-        scores = new_scores(stop - start, goals)
+        scores = new_scores(stop - start, self.scorer.problem.goals.number)
         scores.reason[out], scores.contact[out] = Reason.EXCLUDED, NO_CONTACT
-        kept = new_scores(int(np.count_nonzero(~out)), goals)
-        score_rows(self.problem, self.grippers, rows.at(~out), kept)
-        scores.put(~out, kept)
+        scores.put(~out, self.scorer.score(rows.at(~out)))
         return scores
 
 
