@@ -9,26 +9,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.kernel.arrays import IntArray
-from tcs.kernel.cache import inner
 
 REACHED, TOO_FAR, JOINT_LIMITS, BODY_BLOCKED = 0, 1, 2, 3
 GRIPPER_BLOCKED_BY_ENVIRONMENT, GRIPPER_BLOCKED_BY_ROBOT, ARM_BLOCKED = 4, 5, 6
-APPROACH_LIMITS, APPROACH_BLOCKED = 8, 9
+EXCLUDED, APPROACH_LIMITS, APPROACH_BLOCKED = 7, 8, 9
+OTHER_GOAL_UNREACHED, ARMS_BLOCKED = 10, 11
 """Reasons, equal to the values of `tcs.placement.tables.Reason`."""
 
 
-@inner
-def progress_of(reason: int) -> int:
-    """Return how far a pose came: 0 out of reach, 4 for a contact of the arm, 5 reached."""
-    if reason == REACHED:
-        return 5
-    if reason == ARM_BLOCKED:
-        return 4
-    if reason == JOINT_LIMITS:
-        return 3
-    if reason == GRIPPER_BLOCKED_BY_ROBOT:
-        return 2
-    return 1 if reason == GRIPPER_BLOCKED_BY_ENVIRONMENT else 0
+NEARNESS = np.empty(12, np.int64)
+"""How near each reason is to reaching the goal: of several poses, the nearest is reported, and of
+several hands the nearest serves."""
+NEARNESS[
+    [
+        EXCLUDED,
+        BODY_BLOCKED,
+        TOO_FAR,
+        GRIPPER_BLOCKED_BY_ENVIRONMENT,
+        GRIPPER_BLOCKED_BY_ROBOT,
+        JOINT_LIMITS,
+        ARM_BLOCKED,
+        APPROACH_LIMITS,
+        APPROACH_BLOCKED,
+        OTHER_GOAL_UNREACHED,
+        ARMS_BLOCKED,
+        REACHED,
+    ]
+] = np.arange(12)
 
 
 JOINTS = 7

@@ -32,11 +32,11 @@ from tcs.kernel.scores import (
     BODY_BLOCKED,
     GRIPPER_BLOCKED_BY_ENVIRONMENT,
     GRIPPER_BLOCKED_BY_ROBOT,
+    NEARNESS,
     REACHED,
     TOO_FAR,
     Scores,
     new_scores,
-    progress_of,
 )
 from tcs.kernel.solvers import Solver, new_solver, out_of_reach, score_pair
 from tcs.kernel.views import unowned
@@ -190,7 +190,7 @@ def _score_rows(
                 reason, code = _score_at_pose(
                     problem, free, work, solver, grippers, state, torso, pose, is_placed
                 )
-                came = progress_of(reason)
+                came = NEARNESS[reason]
                 if came > farthest:
                     scores.reason[row, g], scores.contact[row, g] = reason, code
                 if reason == REACHED:

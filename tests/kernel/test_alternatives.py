@@ -10,7 +10,7 @@ import pytest
 from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import grid_rows
-from tcs.kernel.scores import BODY_BLOCKED, REACHED, progress_of
+from tcs.kernel.scores import BODY_BLOCKED, NEARNESS, REACHED
 from tcs.kernel.sweep import blocked_grippers, gripper_contacts
 from tcs.kernel.verification.dense import dense_scans
 from tcs.model.tasks import Freedom
@@ -58,7 +58,7 @@ def test_a_goal_has_the_score_of_the_best_of_its_poses(scene, alone):
 
 def test_the_reason_is_that_of_the_pose_that_comes_farthest(scene, alone):
     scores = scores_of(scene._replace(first_pose=FIRST), toy_grid(states=1))
-    progress = np.vectorize(getattr(progress_of, "py_func", progress_of))(alone.reason)
+    progress = NEARNESS[alone.reason]
     for g, (a, b) in enumerate(itertools.pairwise(FIRST)):
         at = a + np.argmax(progress[:, a:b], axis=1)
         rows = np.flatnonzero(~np.isin(scores.reason[:, g], (REACHED, BODY_BLOCKED)))

@@ -312,7 +312,7 @@ def test_nothing_the_arm_can_touch_is_left_off_the_list(rng):
     # Straight up, this arm reaches as far as `arm_radius` allows.
     chain = straight_arm(np.full(7, 3.0), 0.0)
     scene = toy_scene(chain, 0)
-    radius = build_problem(scene).arm_radius
+    radius = build_problem(scene).clearances.arm_radius
     extents = []
     for q in (np.zeros(7), *rng.uniform(-3, 3, (50, 7))):
         poses = link_poses(chain, q)

@@ -31,9 +31,9 @@ from tcs.kernel.scores import (
     GRIPPER_BLOCKED_BY_ENVIRONMENT,
     GRIPPER_BLOCKED_BY_ROBOT,
     JOINT_LIMITS,
+    NEARNESS,
     REACHED,
     TOO_FAR,
-    progress_of,
 )
 from tcs.kernel.solvers import THOROUGH, Solver, score_pose
 from tcs.kernel.workspace import Workspace
@@ -41,10 +41,10 @@ from tcs.kernel.workspace import Workspace
 SCALES = np.array([0.4, 0.2, 0.1])
 """Distances of the poses tried from the best one, in rounds of the refinement, as parts of the
 range of each parameter."""
-PROMISING = 2
-"""Progress of a sample from which further poses next to it are tried."""
-CLOSE, PART = 4, 3
-"""Progress from which all of the poses next to a sample of any orientation are tried; next to
+PROMISING = int(NEARNESS[GRIPPER_BLOCKED_BY_ROBOT])
+"""Nearness of a sample from which further poses next to it are tried."""
+CLOSE, PART = int(NEARNESS[ARM_BLOCKED]), 3
+"""Nearness from which all of the poses next to a sample of any orientation are tried; next to
 others, one in PART is."""
 NONE, SOME, ALL = 0, 1, 2
 """How many of the poses next to a sample are tried."""
@@ -218,7 +218,7 @@ def _try_samples(
         why, code = _reach_of(bounds, free.wrist[start + n], 0.0), NO_CONTACT
         if why != REACHED:
             # The edge of what is within reach may be next to it.
-            came = progress_of(why)
+            came = NEARNESS[why]
             if came > farthest:
                 farthest, reason, contact = came, why, code
             continue
@@ -232,7 +232,7 @@ def _try_samples(
             if measure > value:
                 value, top, least = measure, n, NEAR * measure
                 copy_joints(solver.best, best)
-        came = progress_of(why)
+        came = NEARNESS[why]
         if came < PROMISING and why != GRIPPER_BLOCKED_BY_ENVIRONMENT:
             worth[n] = NONE
         elif PROMISING <= came < CLOSE and any_orientation:
@@ -271,7 +271,7 @@ def _try_next_to(
         The pose that reaches the goal, or -1; reason and contact code as `_try_samples`.
     """
     free, start = problem.goals.freedom, problem.goals.freedom.start[goal.list]
-    farthest = progress_of(reason)
+    farthest = NEARNESS[reason]
     for n in range(len(worth)):
         first, last = free.child_first[start + n], free.child_first[start + n + 1]
         if worth[n] == NONE:
@@ -290,7 +290,7 @@ def _try_next_to(
             why, code = _score_at(problem, work, solver, grippers, goal, NO_SAMPLE, u, ANY, False)
             if why == REACHED:
                 return k, why, code
-            came = progress_of(why)
+            came = NEARNESS[why]
             if came > farthest:
                 farthest, reason, contact = came, why, code
     return -1, reason, contact
@@ -417,7 +417,7 @@ def _score_turned(
                 if measure > value:
                     found, value, least = True, measure, max(least, NEAR * measure)
                     copy_joints(solver.best, kept)
-        came = progress_of(why)
+        came = NEARNESS[why]
         if came > farthest:
             farthest, reason, contact = came, why, code
     if found:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tcs.errors import RobotError
 from tcs.files.mapped import chunks, large_zeros
-from tcs.kernel.scores import REACHED, Scores, new_scores
+from tcs.kernel.scores import NEARNESS, REACHED, Scores, new_scores
 from tcs.model.robots import BOTH
 from tcs.model.scene import SceneSpec
 from tcs.model.tasks import partners
@@ -24,25 +24,6 @@ from tcs.placement.tables import Reason, ScoreTable
 
 if TYPE_CHECKING:
     from tcs.placement.scoring.offline import Scored, ScoringSetup
-
-NEARNESS = np.empty(len(Reason), np.uint8)
-"""How near each reason is to reaching the goal, as `tcs.kernel.scores.progress_of` has it."""
-NEARNESS[
-    [
-        Reason.EXCLUDED,
-        Reason.BODY_BLOCKED,
-        Reason.TOO_FAR,
-        Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT,
-        Reason.GRIPPER_BLOCKED_BY_ROBOT,
-        Reason.JOINT_LIMITS,
-        Reason.ARM_BLOCKED,
-        Reason.APPROACH_LIMITS,
-        Reason.APPROACH_BLOCKED,
-        Reason.OTHER_GOAL_UNREACHED,
-        Reason.ARMS_BLOCKED,
-        Reason.REACHED,
-    ]
-] = np.arange(len(Reason))
 
 
 def serving_hands(

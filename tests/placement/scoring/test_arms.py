@@ -7,6 +7,7 @@ import pytest
 
 import tcs
 from tcs.errors import RobotError, StoreError, UnknownNameError
+from tcs.kernel.scores import NEARNESS
 from tcs.model.grid import InitialConfiguration
 from tcs.model.robots import arm_references
 from tcs.placement.constraints import Constraints, Obstacle
@@ -14,7 +15,7 @@ from tcs.placement.reasons import explain
 from tcs.placement.refinement.by_arm import explained_by_arm
 from tcs.placement.robustness import Trials
 from tcs.placement.scoring import LiveScorer, score, verify
-from tcs.placement.scoring.hands import NEARNESS, serving_hands
+from tcs.placement.scoring.hands import serving_hands
 from tcs.placement.scoring.verify import check_pairs
 from tcs.placement.selection import SelectionTables, select
 from tcs.placement.selection.admission import admitted_candidates
