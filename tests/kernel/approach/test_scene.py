@@ -31,7 +31,9 @@ def test_pairs_that_touch_at_another_torso_level_are_kept():
     body[1, :, CENTRE : CENTRE + 3] = link_poses(chain, np.zeros(7))[1][1]
     # Two joints decide whether shapes of link 2 and fixed ones can touch.
     frame = np.where(problem.links.frame == 4, 2, problem.links.frame)
-    problem = problem._replace(body_A=body, link_frame=frame)
+    problem = problem._replace(
+        body=problem.body._replace(shapes_A=body), links=problem.links._replace(frame=frame)
+    )
     first, second = needed_at(problem, 0), needed_at(problem, 1)
     assert second - first
     scene = approach_scene(problem).motion
