@@ -7,10 +7,9 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any, NamedTuple, Unpack
 
 from tcs.files.blocks import BlockFolder
 from tcs.kernel.dexterity import DEFAULT_MEASURE, dexterity
@@ -44,8 +43,7 @@ WITHOUT = ApproachChoice(False)
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, eq=False)
-class Scored:
+class Scored(NamedTuple):
     """The scores of a job, and what its score file records about them."""
 
     tables: tuple[ScoreTable, ...]
@@ -76,30 +74,6 @@ class ScoringSetup:
     engine: ScoringEngine | None = None
     """Who scores; None for `jobs` threads of this process."""
 
-    def score(
-        self,
-        *,
-        begun: float,
-        metadata: Mapping[str, Any] | None = None,
-        on_progress: Callable[[int, int], None] | None = None,
-        on_compile: Callable[[], None] | None = None,
-    ) -> ScoreFile:
-        """Score the job and return its score file.
-
-        A pair of robot bodies that refuses more goals than are reached is logged as a warning and
-        recorded in the metadata as `self_contact`.
-
-        Args:
-            begun: Start of the work, by `time.perf_counter` [s].
-            metadata: Further entries of the file's metadata.
-            on_progress: Called with the number of scored configurations and their total.
-            on_compile: Called before the kernel compiles, if it has to.
-        """
-        scored = self.scored(on_progress=on_progress, on_compile=on_compile)
-        return self.file_of(
-            scored.tables, self.job.grid, begun, {**scored.entries, **(metadata or {})}
-        )
-
     def scored(
         self,
         *,
@@ -107,6 +81,9 @@ class ScoringSetup:
         on_compile: Callable[[], None] | None = None,
     ) -> Scored:
         """Return the scores of the job, before sets are built.
+
+        A pair of robot bodies that refuses more goals than are reached is logged as a warning and
+        recorded in the metadata as `self_contact`.
 
         Args:
             on_progress: Called with the number of scored configurations and their total.
@@ -337,8 +314,13 @@ def score_setups(
         on_progress: Called with the number of scored configurations and their total.
         on_compile: Called before the kernel compiles, if it has to.
     """
-    score_all = setups[0].score if len(setups) == 1 else partial(score_hands, setups)
-    return score_all(begun=begun, metadata=metadata, on_progress=on_progress, on_compile=on_compile)
+    if len(setups) > 1:
+        return score_hands(
+            setups, begun=begun, metadata=metadata, on_progress=on_progress, on_compile=on_compile
+        )
+    (setup,) = setups
+    tables, entries = setup.scored(on_progress=on_progress, on_compile=on_compile)
+    return setup.file_of(tables, setup.job.grid, begun, {**entries, **(metadata or {})})
 
 
 def _task_as_dict(task: Task) -> dict[str, Any]:

@@ -43,12 +43,9 @@ class Scorer(NamedTuple):
             rows: The rows.
             jobs: Number of threads; the scores do not depend on it.
         """
-        if jobs == 1:
-            return self._score(rows)
-        parts = (rows.at(slice(i, i + BATCH)) for i in range(0, max(rows.number, 1), BATCH))
-        return joined(Parallel(n_jobs=jobs, prefer="threads")(map(delayed(self._score), parts)))
-
-    def _score(self, rows: Rows) -> Scores:
+        if jobs > 1:
+            parts = (rows.at(slice(i, i + BATCH)) for i in range(0, max(rows.number, 1), BATCH))
+            return joined(Parallel(n_jobs=jobs, prefer="threads")(map(delayed(self.score), parts)))
         scores = score(self.problem, rows, self.grippers)
         if self.approaches is not None:
             self.approaches.score_rows(self.problem, rows, scores)

@@ -19,7 +19,7 @@ from tcs.kernel import cache
 from tcs.kernel.arrays import GridArrays
 from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.rows import grid_rows
-from tcs.kernel.scores import Scores, joined, new_scores
+from tcs.kernel.scores import joined, new_scores
 from tcs.placement.scoring.blocks import Block
 from tcs.placement.scoring.scorer import Scorer
 from tcs.placement.tables import Reason
@@ -48,24 +48,21 @@ class Work(NamedTuple):
 
     def score(self, part: Part) -> Block:
         """Return the scores of a part."""
-        slices = [
-            self._score(begin, min(begin + SLICE, part.stop))
-            for begin in range(part.start, part.stop, SLICE)
-        ]
+        slices = []
+        for start in range(part.start, part.stop, SLICE):
+            stop = min(start + SLICE, part.stop)
+            rows = grid_rows(self.grid, start, stop)
+            if self.excluded is None:
+                slices.append(self.scorer.score(rows))
+                continue
+            out = self.excluded[start:stop]
+            scores = new_scores(rows.number, self.scorer.problem.goals.number)
+            scores.reason[out], scores.contact[out] = Reason.EXCLUDED, NO_CONTACT
+            scores.put(~out, self.scorer.score(rows.at(~out)))
+            slices.append(scores)
         reason, contact, dexterity, joints = joined(slices)
         # Only reached pairs, about one in ten, have joints to keep.
         return Block(reason, contact, dexterity, joints[reason == Reason.REACHED])
-
-    def _score(self, start: int, stop: int) -> Scores:
-        """Return the scores of configurations start <= h < stop."""
-        rows = grid_rows(self.grid, start, stop)
-        if self.excluded is None:
-            return self.scorer.score(rows)
-        out = self.excluded[start:stop]
-        scores = new_scores(stop - start, self.scorer.problem.goals.number)
-        scores.reason[out], scores.contact[out] = Reason.EXCLUDED, NO_CONTACT
-        scores.put(~out, self.scorer.score(rows.at(~out)))
-        return scores
 
 
 class ScoringEngine(Protocol):
@@ -107,13 +104,10 @@ class Threads:
         self, work: Work, parts: Sequence[Part]
     ) -> Generator[tuple[Part, Block], None, None]:
         """As in `ScoringEngine`."""
-        yield from Parallel(n_jobs=self.jobs, prefer="threads", return_as="generator")(
-            delayed(_with_part)(work, part) for part in parts
+        blocks = Parallel(n_jobs=self.jobs, prefer="threads", return_as="generator")(
+            delayed(work.score)(part) for part in parts
         )
-
-
-def _with_part(work: Work, part: Part) -> tuple[Part, Block]:
-    return part, work.score(part)
+        yield from zip(parts, blocks, strict=True)
 
 
 class PackedWork(NamedTuple):
