@@ -204,7 +204,7 @@ class ApproachScorer:
         Args:
             problem: The problem of this scorer, or with its environment in other states.
             rows: The configurations.
-            scores: Their scores, as `tcs.kernel.sweep.score_rows` fills them.
+            scores: Their scores, as `tcs.kernel.sweep.score` returns them.
         """
         from tcs.kernel.approach.sweep import score_approaches
 
