@@ -18,5 +18,12 @@ def test_the_problem_of_the_papers_man_is_that_of_the_scene(robot, tmp_path):
     arrays = arrays._replace(arm=arrays.arm._replace(pad=pad))
     expected = build_problem(arrays)
     found = PersonProblems(arrays, "isotropy").of(arrays)
-    for name in ("gap_environment", "gap_base", "environment", "goal_R", "goal_p", "links"):
-        np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), name)
+    clearances, goals = ("environment", "base", "widest", "arm_radius"), ("R", "p")
+    for part, names in {
+        "clearances": clearances,
+        "environment": ("shapes",),
+        "goals": goals,
+    }.items():
+        for name in names:
+            values = (getattr(getattr(one, part), name) for one in (found, expected))
+            np.testing.assert_array_equal(*values, f"{part}.{name}")
