@@ -3,6 +3,7 @@
 import importlib
 import logging
 import os
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -86,7 +87,7 @@ def test_only_a_missing_block_starts_the_kernel(run, plain, tmp_path, monkeypatc
         raise MemoryError("the kernel is started")
 
     monkeypatch.setattr(KERNEL_START, "warm_up", start)
-    monkeypatch.setattr(SWEEP, "gripper_contacts", start)
+    monkeypatch.setattr(SWEEP, "Scorer", SimpleNamespace(of=start))
     assert_same(run()[0], plain)
     files(tmp_path)[0].unlink()
     with pytest.raises(MemoryError, match="is started"):
@@ -207,7 +208,7 @@ def scored_goals(monkeypatch):
     counts, scores_of = [], Work.score
 
     def counted(work, part):
-        counts.append(work.problem.goals.p.shape[1])
+        counts.append(work.scorer.problem.goals.p.shape[1])
         return scores_of(work, part)
 
     monkeypatch.setattr(Work, "score", counted)

@@ -5,7 +5,6 @@ import pytest
 
 from tcs.errors import TcsError, UnknownNameError
 from tcs.kernel.problem import build_problem
-from tcs.kernel.sweep import gripper_contacts
 from tcs.placement.scoring.engines import (
     ENGINES,
     Dask,
@@ -15,6 +14,7 @@ from tcs.placement.scoring.engines import (
     engine_named,
 )
 from tcs.placement.scoring.engines.work import PackedWork
+from tcs.placement.scoring.scorer import Scorer
 from tcs.placement.scoring.sweep import sweep
 
 PART = 40
@@ -40,7 +40,7 @@ def plain(lowered, small_job, excluded):
 @pytest.fixture(scope="module")
 def work(lowered, excluded):
     problem = build_problem(lowered.arrays)
-    return Work(problem, lowered.grid, gripper_contacts(problem), excluded)
+    return Work(Scorer.of(problem), lowered.grid, excluded)
 
 
 @pytest.fixture(scope="module")
