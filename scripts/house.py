@@ -1,6 +1,9 @@
-"""Print the size and the language of the code: lines, lengths, and private words that are left.
+"""Print the size, the structure and the language of the code: lines, files, and private words.
 
-Usage: python scripts/house.py [--words] [--below FOLDER]
+Usage: python scripts/house.py [--words] [--files] [--below FOLDER]
+
+Structure is what makes a reader open more files than needed: short files with one importer, file
+names that are used often, circles of imports, named tuples of many fields.
 
 Private words are those that a roboticist who knows Drake, MoveIt and the papers would not use;
 `WORDS` lists them with the field's word. Identifiers are split at underscores and capitals first.
@@ -14,9 +17,14 @@ import re
 import statistics
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
+import grimp
+
 CHECKOUT = Path(__file__).resolve().parents[1]
+# A file with fewer lines and one importer belongs into it; more files of one name say nothing.
+SHORT, OFTEN = 60, 3
 TEXT = {".py", ".md", ".yaml", ".toml", ".css"}
 # The change log quotes the past, and this file quotes the words.
 LEFT_OUT = {"CHANGELOG.md", "scripts/house.py", "LICENSE"}
@@ -70,11 +78,13 @@ def main() -> int:
     """Print the figures; with `--words`, each private word with file and line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--words", action="store_true", help="list every private word")
+    parser.add_argument("--files", action="store_true", help="list files, names and circles too")
     parser.add_argument("--below", default="", help="only files whose path starts so")
     options = parser.parse_args()
     files = [path for path in tracked() if str(path).startswith(options.below)]
     for folder in ("tcs", "shapes", "studies", "tests"):
         sizes(folder, [path for path in files if path.parts[0] == folder])
+    structure(options.files)
     found = [hit for path in files for hit in private_words(path)]
     if options.words:
         for path, number, word, better in found:
@@ -124,6 +134,70 @@ def sizes(folder: str, files: list[Path]) -> None:
             median = statistics.median(lengths)
             ninth = statistics.quantiles(lengths, n=10)[-1] if len(lengths) > 1 else lengths[0]
             print(f"{folder}: {name} length: median {median:g}, 90th percentile {ninth:g} lines")
+
+
+def structure(listed: bool) -> None:
+    """Print how many short files, frequent names and circles `tcs` has, and its largest tuple."""
+    graph = grimp.build_graph("tcs", cache_dir=None)
+    paths = {module: path_of(module) for module in graph.modules}
+    modules = {m: path for m, path in paths.items() if not path.name.startswith("__")}
+    short = [
+        (path, next(iter(importers), "nothing"))
+        for module, path in sorted(modules.items())
+        if len(importers := graph.find_modules_that_directly_import(module)) <= 1
+        and len(path.read_text(encoding="utf-8").splitlines()) < SHORT
+    ]
+    names = Counter(path.name for path in modules.values())
+    often = [f"{name} {count}" for name, count in names.most_common() if count > OFTEN]
+    found = circles({m: graph.find_modules_directly_imported_by(m) for m in graph.modules})
+    fields, largest = max(
+        (sum(isinstance(line, ast.AnnAssign) for line in node.body), node.name)
+        for path in paths.values()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ClassDef)
+        and any(isinstance(base, ast.Name) and base.id == "NamedTuple" for base in node.bases)
+    )
+    print(f"tcs: {len(short)} files under {SHORT} lines with one importer")
+    if listed:
+        print("\n".join(f"  {path.relative_to(CHECKOUT)} <- {by}" for path, by in short))
+    print(f"tcs: {len(often)} names of more than {OFTEN} files: {', '.join(often) or 'none'}")
+    print(f"tcs: {len(found)} circles of imports, those for type checkers included")
+    if listed:
+        print("\n".join(f"  {' '.join(sorted(circle))}" for circle in found))
+    print(f"tcs: largest named tuple {largest} with {fields} fields")
+
+
+def path_of(module: str) -> Path:
+    """Return the file of a module or package."""
+    path = CHECKOUT.joinpath(*module.split("."))
+    return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+
+
+def circles(imported: dict[str, set[str]]) -> list[list[str]]:
+    """Return the strongly connected groups of two or more modules (Tarjan)."""
+    number: dict[str, int] = {}
+    lowest: dict[str, int] = {}
+    open_: list[str] = []
+    found: list[list[str]] = []
+
+    def visit(module: str) -> None:
+        number[module] = lowest[module] = len(number)
+        open_.append(module)
+        for other in imported[module]:
+            if other not in number:
+                visit(other)
+            if other in open_:
+                lowest[module] = min(lowest[module], lowest[other])
+        if lowest[module] == number[module]:
+            circle = open_[open_.index(module) :]
+            del open_[-len(circle) :]
+            if len(circle) > 1:
+                found.append(circle)
+
+    for module in sorted(imported):
+        if module not in number:
+            visit(module)
+    return found
 
 
 def private_words(path: Path) -> list[tuple[Path, int, str, str]]:
