@@ -34,11 +34,11 @@ from tcs.model.people import Scale, draw_bodies, scales_of_people
 from tcs.model.robots import load_robot, robot_names
 from tcs.model.scene import PeopleInScene, load_environment
 from tcs.model.tasks import load_task
-from tcs.placement.scoring.catalogue import task_environment_pairs
 from tcs.placement.scoring.dry_run import ScoredSlice, estimate_from, scored_slice
 from tcs.placement.scoring.engines import Part, Work
 from tcs.placement.scoring.job import load_job
 from tcs.placement.scoring.kernel_start import warm_up
+from tcs.placement.scoring.score_to_file import task_environment_pairs
 from tcs.placement.scoring.scorer import Scorer
 
 SLICE = 128

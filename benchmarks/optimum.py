@@ -39,7 +39,7 @@ from table import header, parser, record, row, save
 import tcs
 from tcs.kernel.arrays import FloatArray
 from tcs.placement.refinement import refinement_summary
-from tcs.placement.refinement.floor import successes
+from tcs.placement.refinement.success_under_error import successes
 from tcs.placement.robustness import PerturbedPoints, Trials
 from tcs.placement.scoring import task_environment_pairs
 from tcs.placement.tables import tc_reachability

@@ -26,7 +26,7 @@ from tcs.kernel.motion.scene import motion_scene, new_motion_workspace
 from tcs.kernel.problem import Problem
 from tcs.kernel.rows import single_row
 from tcs.model.robots import load_robot
-from tcs.placement.refinement.poses import PoseScene
+from tcs.placement.refinement.base_poses import PoseScene
 
 COUNTS = (2, 4, 8, 16, 32, 64)
 """Numbers of tool poses, one after the other."""

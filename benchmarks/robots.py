@@ -29,8 +29,8 @@ from tcs.kernel.cache import kernel_digest
 from tcs.model.robots import robot_names
 from tcs.output.words.reasons import REASON_NAMES
 from tcs.placement.scoring import load_job, score, sweep, verify
-from tcs.placement.scoring.catalogue import task_environment_pairs
-from tcs.placement.scoring.strata import STRATA, estimated_recall
+from tcs.placement.scoring.file_checker import STRATA, estimated_recall
+from tcs.placement.scoring.score_to_file import task_environment_pairs
 
 ENVIRONMENT = "wheelchair"
 RECALL = 0.9999

@@ -42,9 +42,13 @@ import tcs
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.model.random_streams import named_generator
 from tcs.placement.refinement.points import PointScorer
-from tcs.placement.refinement.space import Space
-from tcs.placement.refinement.staged import StagedSamples
-from tcs.placement.refinement.surest import SurestSearch, surest_pairs, surest_triples
+from tcs.placement.refinement.search import Space
+from tcs.placement.refinement.surest import (
+    StagedSamples,
+    SurestSearch,
+    surest_pairs,
+    surest_triples,
+)
 from tcs.placement.robustness import PerturbedPoints, Trials
 from tcs.placement.tables import Reason
 from tcs_studies.output.report.robustness.paper import load_paper

@@ -25,12 +25,10 @@ from table import header, parser, record, row, save
 import tcs
 from tcs.kernel.arrays import FloatArray
 from tcs.model.random_streams import named_generator
-from tcs.placement.refinement.floor import RememberedSamples, at_surest
 from tcs.placement.refinement.points import PointScorer
-from tcs.placement.refinement.search import Walk
-from tcs.placement.refinement.space import Space
-from tcs.placement.refinement.staged import StagedSamples, best_pairs
-from tcs.placement.refinement.surest import SurestSearch
+from tcs.placement.refinement.search import Space, Walk
+from tcs.placement.refinement.success_under_error import RememberedSamples, at_surest
+from tcs.placement.refinement.surest import StagedSamples, SurestSearch, best_pairs
 from tcs.placement.robustness import PerturbedPoints, Trials
 from tcs_studies.output.report.robustness.paper import load_paper
 

@@ -138,6 +138,7 @@ def sizes(folder: str, files: list[Path]) -> None:
 
 def structure(listed: bool) -> None:
     """Print how many short files, frequent names and circles `tcs` has, and its largest tuple."""
+    sys.path.insert(0, str(CHECKOUT))
     graph = grimp.build_graph("tcs", cache_dir=None)
     paths = {module: path_of(module) for module in graph.modules}
     modules = {m: path for m, path in paths.items() if not path.name.startswith("__")}

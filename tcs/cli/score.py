@@ -172,7 +172,7 @@ def score(
 
     from tcs.cli.values import person_values, settings
     from tcs.model.robot_check import quick_problems
-    from tcs.placement.scoring import default_path, files
+    from tcs.placement.scoring import default_path, score_to_file
     from tcs.placement.scoring.engines import engine_named
 
     offline: dict[str, Any] = {
@@ -193,11 +193,11 @@ def score(
         "on_compile": terminal.note_compiling,
     }
     if dry_run:
-        rows = files.estimate_all(task, environment, robot, arms=arms, **scoring_options)
+        rows = score_to_file.estimate_all(task, environment, robot, arms=arms, **scoring_options)
         terminal.print_result({"rows": rows}, tables.report_estimates, as_json=as_json)
         return
     if task is None:
-        rows = files.score_all_to_files(
+        rows = score_to_file.score_all_to_files(
             environment,
             robot,
             out or Path(),
@@ -226,7 +226,7 @@ def score(
         terminal.note(f"warning, robot '{robot}': {problem} See: tcs robot check {robot}")
     if not observed and not frames:
         with _progress(task) as on_progress:
-            result = files.score_to_file(
+            result = score_to_file.score_to_file(
                 task,
                 environment,
                 robot,
@@ -256,7 +256,7 @@ def score(
         frames=frame_values(frames or ()),
         setting=settings(at or (), "--at"),
     )
-    result = files.score_observed_to_file(
+    result = score_to_file.score_observed_to_file(
         task, environment, robot, path, observation, **scoring_options
     )
     _note_without_approach([result])

@@ -26,7 +26,7 @@ from tcs.motion.stop_tour import plan_stop
 from tcs.motion.stops import BodyPair, Stop, StopGrid, single_grid
 from tcs.placement.robustness import ErrorModel, Mean, mean_of
 from tcs.placement.robustness.body_collisions import base_bodies
-from tcs.placement.robustness.displacements import displaced
+from tcs.placement.robustness.error_model import displaced
 from tcs.placement.robustness.trials import Errors, Progress
 
 _STREAM = "plan"

@@ -105,5 +105,5 @@ def stand_in(monkeypatch, example):
         calls.append((arguments, options))
         return example()
 
-    monkeypatch.setattr("tcs.placement.scoring.files.score", score)
+    monkeypatch.setattr("tcs.placement.scoring.score_to_file.score", score)
     return calls

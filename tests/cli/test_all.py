@@ -33,7 +33,7 @@ def stand_in(monkeypatch):
         names = {"task": {"name": task}, "environment": {"name": environment}}
         return score_file(metadata={**METADATA, "timings": TIMINGS}, **names)
 
-    monkeypatch.setattr("tcs.placement.scoring.files.score", score)
+    monkeypatch.setattr("tcs.placement.scoring.score_to_file.score", score)
     return calls
 
 

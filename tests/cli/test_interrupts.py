@@ -22,7 +22,7 @@ def test_first_run_reports_that_it_compiles(tcs_command, example, tmp_path, monk
         on_progress(1, 2)
         return example()
 
-    monkeypatch.setattr("tcs.placement.scoring.files.score", score)
+    monkeypatch.setattr("tcs.placement.scoring.score_to_file.score", score)
     ran = tcs_command("score", "shaving", "--out", tmp_path / "o.tcs", "--json")
     # One line, no bar: stderr is no terminal here.
     assert (
@@ -34,7 +34,7 @@ def test_first_run_reports_that_it_compiles(tcs_command, example, tmp_path, monk
 
 SLOW_SCORE = """
 import time
-import tcs.placement.scoring.files as files
+import tcs.placement.scoring.score_to_file as files
 def score(*arguments, on_progress, **options):
     for done in range(200):
         on_progress(done, 200)
@@ -226,7 +226,7 @@ def test_interrupt_in_a_callback_of_compiled_code_is_one_line(process, tmp_path)
     """Python prints such an interrupt and continues, as callbacks of llvmlite cannot raise."""
     before = """
 import ctypes, signal
-import tcs.placement.scoring.files as files
+import tcs.placement.scoring.score_to_file as files
 callback = ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGINT))
 def score(*arguments, on_progress, **options):
     callback()
@@ -245,7 +245,7 @@ def test_an_interrupt_dropped_by_compiled_code_takes_effect(tcs_command, tmp_pat
         on_progress(1, 2)
         raise AssertionError("must not get here")
 
-    monkeypatch.setattr("tcs.placement.scoring.files.score", score)
+    monkeypatch.setattr("tcs.placement.scoring.score_to_file.score", score)
     ran = tcs_command("score", "shaving", "--out", tmp_path / "o.tcs")
     assert ran.code == 130
     assert "interrupted" in ran.err
@@ -272,7 +272,7 @@ def test_too_little_memory_is_told_in_one_line(error, tcs_command, tmp_path, mon
     def score(*_arguments, **_options):
         raise error
 
-    monkeypatch.setattr("tcs.placement.scoring.files.score", score)
+    monkeypatch.setattr("tcs.placement.scoring.score_to_file.score", score)
     ran = tcs_command("score", "shaving", "--out", tmp_path / "o.tcs")
     assert ran.code == 1
     assert ran.err.startswith("tcs: the memory does not suffice.")

@@ -338,7 +338,7 @@ def test_the_measure_is_passed_on_and_named(tcs_command, example, tmp_path, monk
         file = example()
         return dataclasses.replace(file, metadata={**file.metadata, "measure": measure})
 
-    monkeypatch.setattr("tcs.placement.scoring.files.score", score)
+    monkeypatch.setattr("tcs.placement.scoring.score_to_file.score", score)
     path = tmp_path / "o.tcs"
     words = ("score", "shaving", "--measure", "inverse-condition", "--out", path)
     assert "(inverse-condition)" in tcs_command(*words).out
@@ -363,7 +363,9 @@ def test_score_as_text(tcs_command, tmp_path, stand_in):
 
 
 def test_nothing_reached_is_an_answer(tcs_command, example, tmp_path, monkeypatch):
-    monkeypatch.setattr("tcs.placement.scoring.files.score", lambda *_, **__: example(share=0.0))
+    monkeypatch.setattr(
+        "tcs.placement.scoring.score_to_file.score", lambda *_, **__: example(share=0.0)
+    )
     path = tmp_path / "o.tcs"
     ran = tcs_command("score", "shaving", "--out", path)
     assert ran.code == 0
@@ -382,7 +384,7 @@ def test_defects_of_the_program_keep_their_traceback(tcs_command, tmp_path, monk
     def score(*_arguments, **_options):
         raise ZeroDivisionError("a mistake")
 
-    monkeypatch.setattr("tcs.placement.scoring.files.score", score)
+    monkeypatch.setattr("tcs.placement.scoring.score_to_file.score", score)
     with pytest.raises(ZeroDivisionError):
         tcs_command("score", "shaving", "--out", tmp_path / "o.tcs")
 

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from tcs.errors import SelectionError, TcsError
 from tcs.model.random_streams import check_draws, named_generator
 from tcs.placement.robustness.evaluation import Evaluation, evaluate
-from tcs.placement.robustness.pairs import EQUAL_REACHABILITY, Pairs, kept_pairs
+from tcs.placement.robustness.kept_pairs import EQUAL_REACHABILITY, Pairs, kept_pairs
 from tcs.placement.robustness.statistics import CONFIDENCE
 from tcs.placement.robustness.trials import Trials
 from tcs.placement.tables import tc_reachability
-from tcs.placement.tables.rules import FRACTION_TOLERANCE
+from tcs.placement.tables.sets import FRACTION_TOLERANCE
 from tcs_studies.robustness.differences import Difference, signed_rank
 
 STRATA = 10

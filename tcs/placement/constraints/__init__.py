@@ -7,13 +7,17 @@ solutions touch an obstacle, which configurations are not preferred.
 
 from __future__ import annotations
 
-from tcs.placement.constraints.axes import SAME_VALUE, axis_constraints, kept_conditions
-from tcs.placement.constraints.blocking import blocked_bodies, blocked_solutions
-from tcs.placement.constraints.constraints import Constraints
-from tcs.placement.constraints.files import merged, read_constraints
+from tcs.placement.constraints.blocking import Postures, blocked_bodies, blocked_solutions
+from tcs.placement.constraints.constraints import (
+    SAME_VALUE,
+    Constraints,
+    axis_constraints,
+    disliked_candidates,
+    kept_conditions,
+    merged,
+    read_constraints,
+)
 from tcs.placement.constraints.obstacles import Obstacle
-from tcs.placement.constraints.postures import Postures
-from tcs.placement.constraints.preferences import disliked_candidates
 from tcs.placement.constraints.regions import Footprint, Region
 from tcs.placement.constraints.scored import (
     constraint_texts,

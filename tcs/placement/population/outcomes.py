@@ -4,27 +4,82 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import ArrayLike, NDArray
 
-from tcs.errors import TcsError
-from tcs.kernel.arrays import IntArray, SceneArrays
+from tcs.errors import StoreFormatError, TcsError
+from tcs.files.blocks import Blocks
+from tcs.files.compression import compress, decompress
+from tcs.kernel.arrays import FloatArray, IntArray, SceneArrays
+from tcs.kernel.groups import with_group_rows
+from tcs.kernel.problem import (
+    TOUCH,
+    UNCHECKED,
+    Problem,
+    arm_order,
+    build_problem,
+    with_environment,
+)
 from tcs.kernel.rows import Rows
 from tcs.model.people import Scale
 from tcs.model.scene import PeopleInScene, SceneSpec
 from tcs.model.tasks import load_task
-from tcs.placement.population.kept_people import BLOCK, PROBES, KeptPeople
-from tcs.placement.population.problems import PersonProblems
 from tcs.placement.robustness.body_collisions import counted_pairs, counted_rests
 from tcs.placement.robustness.error_model import Offsets
 from tcs.placement.robustness.perturbed_scenes import HandScenes, PerturbedScenes, Run
 from tcs.placement.robustness.trials import HandTrials, Progress, Trials
 from tcs.placement.scoring.scorer import Scorer
 from tcs.placement.scoring.together import Hands
+from tcs.placement.tables import Reason
+
+
+class PersonProblems:
+    """Problems of one robot in one environment, for one person after the other.
+
+    Arranging the robot takes a hundred times as long as what a person changes.
+    """
+
+    def __init__(self, arrays: SceneArrays, measure: str) -> None:
+        """Arrange the robot.
+
+        Args:
+            arrays: The scene with any person.
+            measure: Name of the dexterity measure.
+        """
+        self._problem = problem = build_problem(arrays, measure)
+        order = arm_order(arrays)
+        self._pads = arrays.arm.pad[order], arrays.body.pad
+        self._checked = arrays.arm_vs_environment[order], arrays.body_vs_environment
+        self._groups = problem.links.groups, problem.body.groups
+        self._margin = arrays.margin
+
+    def of(self, arrays: SceneArrays) -> Problem:
+        """Return the problem of a person.
+
+        Args:
+            arrays: The same scene with the person; only its environment and goals are read.
+        """
+        known, pad = self._problem.clearances, arrays.environment.pad
+        widest = max(known.widest, 2.0 * float(pad.max(initial=0.0)))
+        clearances = known._replace(
+            environment=self._gaps(0, pad),
+            base=self._gaps(1, pad),
+            widest=widest,
+            arm_radius=known.arm_radius + (widest - known.widest),
+        )
+        return with_environment(self._problem, arrays)._replace(clearances=clearances)
+
+    def _gaps(self, group: int, pad: FloatArray) -> FloatArray:
+        """Return the distances that arm (0) or body (1) keep from the environment [m]."""
+        required = np.maximum(max(self._margin, TOUCH), self._pads[group][:, None] + pad)
+        gaps = np.where(self._checked[group], required, UNCHECKED)
+        return with_group_rows(np.ascontiguousarray(gaps), self._groups[group])
+
 
 CHUNK = 500
 """People whose scenes are held in memory together: with errors, some ten megabytes for each state
@@ -230,3 +285,85 @@ def _evaluated(
 def _hand_scenes(hand: _Prepared, arrays: SceneArrays) -> HandScenes:
     """Return the states of one person's scene for one hand."""
     return HandScenes(Scorer.of(hand.problems.of(arrays)), hand.goals)
+
+
+BLOCK = 100
+"""People of a block: a second of work or less."""
+PROBES = 4
+"""People whose scenes are part of a block's name."""
+
+
+@dataclass(frozen=True, slots=True)
+class KeptPeople:
+    """The blocks of some configurations for some people."""
+
+    blocks: Blocks
+    inputs: str
+    """Hash of what all blocks follow from, beside the key of the folder."""
+    of_people: tuple[bytes, ...]
+    """What is particular to each person: how the parts are stretched, and the errors."""
+    shape: tuple[int, int]
+    """Numbers of configurations and of goals."""
+
+    @classmethod
+    def of(
+        cls,
+        blocks: Blocks,
+        poses: Rows,
+        scales: Sequence[Mapping[str, Scale]],
+        offsets: Offsets | None,
+        *,
+        scenes: str,
+        goals: int,
+    ) -> Self:
+        """Return the blocks of some configurations for some people.
+
+        Args:
+            blocks: Where they are kept.
+            poses: The configurations.
+            scales: How the parts of each of N people are stretched.
+            offsets: Errors of the environment's joints for each, shapes (N,); None for no errors.
+            scenes: Hash of the scenes of the first `PROBES` people, as the kernel sees them.
+            goals: Number of goals.
+        """
+        sha = hashlib.sha256(f"people\0{scenes}\0{sorted(offsets or ())}\0".encode())
+        for part in poses:
+            sha.update(np.asarray(part, dtype="<f8").tobytes())
+        errors = [np.asarray(values, "<f8") for _, values in sorted((offsets or {}).items())]
+        of_people = tuple(
+            repr(sorted(one.items())).encode() + b"".join(values[i].tobytes() for values in errors)
+            for i, one in enumerate(scales)
+        )
+        return cls(blocks, sha.hexdigest(), of_people, (poses.state.size, goals))
+
+    def load(self, people: IntArray) -> NDArray[np.uint8] | None:
+        """Return the reasons for some people; None if they have to be evaluated.
+
+        Args:
+            people: Their numbers, shape (n,).
+
+        Returns:
+            Codes of reasons, shape (configurations, n, goals).
+        """
+        return self.blocks.load(self._name(people), lambda content: self._decode(content, people))
+
+    def save(self, people: IntArray, reasons: NDArray[np.uint8]) -> None:
+        """Write the reasons for some people, as returned by `load`.
+
+        Raises:
+            OutputError: If they cannot be written.
+        """
+        self.blocks.save(self._name(people), {"reason": compress(reasons)})
+
+    def _name(self, people: IntArray) -> str:
+        sha = hashlib.sha256(self.inputs.encode())
+        for person in people.tolist():
+            sha.update(hashlib.sha256(self.of_people[person]).digest())
+        return sha.hexdigest()[:24]
+
+    def _decode(self, content: dict[str, Any], people: IntArray) -> NDArray[np.uint8]:
+        rows, goals = self.shape
+        reason = decompress(content, "reason", "u1", (rows, people.size, goals))
+        if reason.max(initial=0) > max(Reason):
+            raise StoreFormatError("has codes that do not exist")
+        return reason

@@ -7,9 +7,8 @@ configuration that reaches the goal.
 
 from __future__ import annotations
 
-from tcs.placement.reasons.changes import Change
 from tcs.placement.reasons.distribution import BlockingPair, CheckCount, Distribution
-from tcs.placement.reasons.explained import ExplainedConfiguration, nearest_configuration
+from tcs.placement.reasons.explained import Change, ExplainedConfiguration, nearest_configuration
 from tcs.placement.reasons.explanation import Explanation, explain
 from tcs.placement.reasons.fix import Fix, fix_weights
 

@@ -11,8 +11,13 @@ from numpy.typing import NDArray
 
 from tcs.errors import SelectionError
 from tcs.model.grid import Grid, InitialConfiguration
-from tcs.placement.reasons.changes import Change, ahead_and_left, changes_between, sentence
-from tcs.placement.reasons.explained import ExplainedConfiguration
+from tcs.placement.reasons.explained import (
+    Change,
+    ExplainedConfiguration,
+    ahead_and_left,
+    changes_between,
+    sentence,
+)
 from tcs.placement.selection import TravelWeights
 from tcs.placement.selection.distances import Distances, LatticeDistances, StraightDistances
 from tcs.placement.selection.travel import legs_from

@@ -5,16 +5,15 @@ In: a score file. Out: the file with refined sets beside those of its grid.
 
 from __future__ import annotations
 
-from tcs.placement.refinement.evaluation import evaluate_refined
-from tcs.placement.refinement.made_table import refinement_summary
-from tcs.placement.refinement.members import (
+from tcs.placement.refinement.evaluation import (
     RefinedMembers,
+    evaluate_refined,
     refined_table,
     score_members,
 )
 from tcs.placement.refinement.place import Placement, place
 from tcs.placement.refinement.points import PointScorer, PointScores
-from tcs.placement.refinement.refined_file import OBJECTIVES, refine
+from tcs.placement.refinement.refined_file import OBJECTIVES, refine, refinement_summary
 
 __all__ = [
     "OBJECTIVES",

@@ -2,22 +2,218 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import TcsError
 from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
-from tcs.kernel.rows import single_row
+from tcs.kernel.motion.edges import certified
+from tcs.kernel.motion.postures import postures_at
+from tcs.kernel.motion.scene import goal_from_arm_base, motion_scene, new_motion_workspace
+from tcs.kernel.problem import Goals, Problem, build_problem
+from tcs.kernel.rows import Rows, single_row
 from tcs.model.grid import Grid
 from tcs.model.random_streams import named_generator
-from tcs.placement.refinement.joint_path import joint_path
-from tcs.placement.refinement.objectives import ScoreObjective
-from tcs.placement.refinement.poses import PoseScene, PoseScorer
-from tcs.placement.refinement.search import LocalSearch
-from tcs.placement.refinement.space import Space
+from tcs.model.robots import RobotFile
+from tcs.model.scene import EMPTY_ENVIRONMENT, Scene, SceneSpec, lower
+from tcs.placement.constraints import Obstacle
+from tcs.placement.refinement.points import PointScores
+from tcs.placement.refinement.search import LocalSearch, ScoreObjective, Space
+from tcs.placement.scoring.job import with_obstacles
+from tcs.placement.scoring.kernel_start import warm_up
+from tcs.placement.scoring.scorer import Scorer
+from tcs.placement.tables import Reason
+
+SAMPLES = 48
+"""Values of the free joint at each pose."""
+MOST_POSTURES = 200
+"""Postures at each pose that paths are searched among."""
+LONGEST_STEP = 2.0
+"""Greatest motion of a joint from one pose to the next [rad]; more is another branch."""
+ATTEMPTS = 40
+"""Paths that are tried, each without the postures and steps that blocked those before."""
+
+
+def joint_path(problem: Problem, row: Rows, through: FloatArray | None = None) -> FloatArray | None:
+    """Return a joint path through all goals of a problem in their order, None if none is found.
+
+    Of all sequences of postures, one at each goal, the one with the least sum of squared steps is
+    taken; each step, straight in joint space, is certified free of contact.
+
+    Args:
+        problem: The scene.
+        row: The initial configuration.
+        through: Further posture at each goal [rad], shape (G, 7), e.g. the best ones of scoring.
+
+    Returns:
+        Joint angles [rad], shape (G, 7); continuous joints are not wrapped.
+    """
+    layers = _layers(problem, row, through)
+    if any(not len(layer) for layer in layers):
+        return None
+    motion = motion_scene(problem, row)
+    work = new_motion_workspace(motion)
+    periodic = motion.period > 0.0
+    costs = [_costs(a, b, periodic) for a, b in itertools.pairwise(layers)]
+    for _ in range(ATTEMPTS):
+        rows = _cheapest(costs)
+        if rows is None:
+            return None
+        path = _unwrapped(np.array([q[i] for q, i in zip(layers, rows, strict=True)]), periodic)
+        blocked = [
+            k
+            for k in range(max(len(path) - 1, 1))
+            if certified(motion, work, _edge(path[k], path[min(k + 1, len(path) - 1)])) < 1.0
+        ]
+        if not blocked:
+            return path
+        if not costs:
+            return None
+        for k in blocked:
+            costs[k][rows[k], rows[k + 1]] = np.inf
+            for side in (k, k + 1):
+                if certified(motion, work, _edge(path[side], path[side])) < 1.0:
+                    _forbid(costs, side, rows[side])
+    return None
+
+
+def _layers(problem: Problem, row: Rows, through: FloatArray | None) -> list[FloatArray]:
+    """Return postures at each goal, shapes (n, 7)."""
+    layers = []
+    for g in range(problem.goals.number):
+        found = postures_at(problem, *goal_from_arm_base(problem, row, g), SAMPLES)
+        found = found[:: max(1, -(-len(found) // MOST_POSTURES))]
+        if through is not None:
+            found = np.concatenate([found, through[g : g + 1]])
+        layers.append(found)
+    return layers
+
+
+def _costs(a: FloatArray, b: FloatArray, periodic: BoolArray) -> FloatArray:
+    """Return the squared steps between postures, infinite for steps that are too long."""
+    step = b[None] - a[:, None]
+    step = np.where(periodic, np.mod(step + np.pi, 2.0 * np.pi) - np.pi, step)
+    cost = np.sum(step**2, axis=2)
+    cost[np.abs(step).max(axis=2) > LONGEST_STEP] = np.inf
+    return np.asarray(cost)
+
+
+def _cheapest(costs: list[FloatArray]) -> list[int] | None:
+    """Return the row in each layer of the cheapest path; None if all are blocked."""
+    if not costs:
+        return [0]
+    total = np.zeros(len(costs[0]))
+    before = []
+    for cost in costs:
+        sums = total[:, None] + cost
+        before.append(np.argmin(sums, axis=0))
+        total = np.min(sums, axis=0)
+    if not np.isfinite(total.min()):
+        return None
+    rows = [int(np.argmin(total))]
+    for back in reversed(before):
+        rows.append(int(back[rows[-1]]))
+    return rows[::-1]
+
+
+def _forbid(costs: list[FloatArray], layer: int, row: int) -> None:
+    """Block a posture that is in contact."""
+    if layer > 0:
+        costs[layer - 1][:, row] = np.inf
+    if layer < len(costs):
+        costs[layer][row] = np.inf
+
+
+def _unwrapped(path: FloatArray, periodic: BoolArray) -> FloatArray:
+    """Return a path whose continuous joints take the shorter way round at each step."""
+    return np.where(periodic, np.unwrap(path, axis=0), path)
+
+
+def _edge(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the control points of a straight step, shape (4, 7)."""
+    return np.linspace(a, b, 4)
+
+
+SINGLE = {"start": 0.0, "step": 0.0, "count": 1}
+
+
+@dataclass(frozen=True, eq=False)
+class PoseScorer:
+    """Scores base poses of a robot among boxes for poses of its tool, at one torso height."""
+
+    scorer: Scorer
+    """The scene, with the tool poses as goals."""
+    grid: Grid
+    """The base poses that the search starts from."""
+    jobs: int
+    """Number of threads; the scores do not depend on it."""
+
+    @classmethod
+    def of(cls, scene: PoseScene, poses: FloatArray, grid: Grid, jobs: int) -> Self:
+        """Return the scorer of tool poses in W, shape (G, 4, 4)."""
+        problem = scene.problem.at_poses(poses[None, :, :3, :3], poses[None, :, :3, 3])
+        return cls(Scorer.of(problem), grid, jobs)
+
+    @property
+    def goals(self) -> Goals:
+        """The tool poses."""
+        return self.scorer.problem.goals
+
+    def of_goals(self, goals: Sequence[int] | IntArray) -> Self:
+        """Return the scorer of some of the goals."""
+        chosen = np.asarray(goals, dtype=np.int64)
+        R, p = self.goals.R[:, chosen], self.goals.p[:, chosen]
+        problem = self.scorer.problem.at_poses(R, p)
+        grippers = np.ascontiguousarray(self.scorer.grippers[:, chosen])
+        return type(self)(Scorer(problem, grippers), self.grid, self.jobs)
+
+    def score(self, points: FloatArray) -> PointScores:
+        """Return the scores of base poses."""
+        x, y, yaw = points[:, :3].T
+        one = np.zeros(len(points), np.int64)
+        found = self.scorer.score(Rows(one, x, y, yaw, one), self.jobs)
+        reached = found.reason == Reason.REACHED
+        hand = np.zeros(reached.shape, np.uint8)
+        return PointScores(reached, found.dexterity, found.joints, hand)
+
+
+@dataclass(frozen=True, eq=False)
+class PoseScene:
+    """A robot among boxes, prepared for any tool poses; building it takes half a second."""
+
+    problem: Problem
+    """The scene without goals."""
+    reach: float
+    """Greatest distance of the tool from the arm's first joint [m]."""
+    arm_base: FloatArray
+    """Origin of the arm base A in B [m], shape (3,)."""
+
+    @classmethod
+    def of(
+        cls, robot: RobotFile, obstacles: Sequence[Obstacle], torso: float, measure: str
+    ) -> Self:
+        """Return the scene of a robot at a torso height [m], the kernel compiled."""
+        scene = Scene(SceneSpec(robot, with_obstacles(EMPTY_ENVIRONMENT, obstacles)))
+        grid = Grid.from_spec(
+            {
+                "base_x": {"unit": "m", **SINGLE},
+                "base_y": {"unit": "m", **SINGLE},
+                "base_yaw": {"unit": "deg", **SINGLE},
+                "torso": {"unit": "m", **SINGLE, "start": torso},
+            }
+        )
+        lowered = lower(scene, None, grid)
+        problem = build_problem(lowered.arrays, measure)
+        warm_up(problem)
+        reach = float(np.linalg.norm(problem.chain.p[1:], axis=1).sum())
+        offset = float(np.linalg.norm(problem.chain.p[0]))
+        return cls(problem, reach + offset, problem.arm_base.p[0])
+
 
 FloorRange = tuple[tuple[float, float], tuple[float, float]]
 """Least and greatest x, and y, of the base [m]."""

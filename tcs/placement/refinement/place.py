@@ -18,8 +18,7 @@ from tcs.kernel.dexterity import DEFAULT_MEASURE, dexterity
 from tcs.model.grid import InitialConfiguration
 from tcs.model.robots import RobotFile, load_robot
 from tcs.placement.constraints import Obstacle
-from tcs.placement.refinement.base_poses import FIRST, SINGLE_STOP, FloorRange, best_stop
-from tcs.placement.refinement.poses import PoseScene
+from tcs.placement.refinement.base_poses import FIRST, SINGLE_STOP, FloorRange, PoseScene, best_stop
 
 MOST_STOPS = 8
 """Greatest number of base poses."""

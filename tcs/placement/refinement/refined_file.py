@@ -7,34 +7,44 @@ import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from importlib.metadata import version
+from typing import Any
 
 import numpy as np
 
 from tcs.errors import SelectionError, TcsError, UnknownNameError
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.model.random_streams import check_draws, named_generator
-from tcs.placement.refinement.displaced import DisplacedBases
-from tcs.placement.refinement.floor import (
+from tcs.placement.refinement.points import PointScorer
+from tcs.placement.refinement.search import (
+    LocalSearch,
+    Samples,
+    ScoreObjective,
+    Space,
+    Walk,
+    without_idle_members,
+)
+from tcs.placement.refinement.success_under_error import (
     HARDEST,
+    DisplacedBases,
     RememberedSamples,
     SuccessFloor,
     at_surest,
     settled,
     successes,
 )
-from tcs.placement.refinement.made_table import as_table, with_estimates, with_refined
-from tcs.placement.refinement.objectives import Samples, ScoreObjective
-from tcs.placement.refinement.points import PointScorer
-from tcs.placement.refinement.search import LocalSearch, Walk, without_idle_members
-from tcs.placement.refinement.space import Space
-from tcs.placement.refinement.staged import StagedSamples
-from tcs.placement.refinement.surest import SurestSearch, surest_pairs, surest_triples
-from tcs.placement.robustness import PerturbedPoints, Trials
+from tcs.placement.refinement.surest import (
+    StagedSamples,
+    SurestSearch,
+    surest_pairs,
+    surest_triples,
+)
+from tcs.placement.robustness import PerturbedPoints, Trials, with_success
 from tcs.placement.robustness.body_collisions import check_body_collisions
 from tcs.placement.selection import Top, UtilityWeights, select
 from tcs.placement.selection.choice import SelectionTables
 from tcs.placement.store import ScoreFile
-from tcs.placement.tables import SetTable, tc_reachability
+from tcs.placement.tables import RefinedTable, SetTable, tc_reachability
+from tcs.placement.tables.success import NO_MEMBER
 
 OBJECTIVES = ("score", "success")
 """What a refinement maximises: P_R + P_M, or the success under the errors of the environment."""
@@ -261,3 +271,100 @@ def _success(
         reached = np.logical_or.reduce(fresh.reached(points), axis=0)
         of_sets.append(float(tc_reachability(reached, sets.weights).mean()))
     return {"before": of_sets[0], "after": of_sets[1], "samples": fresh.samples}
+
+
+KEY = "refinement"
+"""Entry of the metadata: for each table, None or the settings and figures of its refinement."""
+
+
+def as_table(
+    walks: Sequence[Walk], weights: np.ndarray[Any, Any], *, has_hands: bool
+) -> RefinedTable:
+    """Return refined sets as one table, in their order.
+
+    Args:
+        walks: The refined sets.
+        weights: Weights of the goals, sum 1, shape (G,).
+        has_hands: Whether the file is of several hands.
+    """
+    width = max(walk.members for walk in walks)
+
+    def filled(arrays: Sequence[np.ndarray[Any, Any]], fill: float) -> np.ndarray[Any, Any]:
+        first = arrays[0]
+        out = np.full((len(arrays), width, *first.shape[1:]), fill, dtype=first.dtype)
+        for row, array in zip(out, arrays, strict=True):
+            row[: len(array)] = array
+        return out
+
+    return RefinedTable(
+        origin=filled([np.array(walk.origin, dtype=np.int32) for walk in walks], NO_MEMBER),
+        values=filled([walk.present.values for walk in walks], 0.0),
+        reached=filled([walk.present.reached for walk in walks], False),
+        dexterity=filled([walk.present.dexterity for walk in walks], 0.0),
+        arm_joints=filled([walk.present.joints for walk in walks], 0.0),
+        hand=filled([walk.present.hand for walk in walks], 0) if has_hands else None,
+        objective=np.array([walk.value for walk in walks]),
+        weights=weights,
+    )
+
+
+def with_estimates(
+    file: ScoreFile, table: int, scorer: PointScorer, refined: RefinedTable
+) -> RefinedTable:
+    """Return refined sets with their success if that of the table's sets was estimated.
+
+    Errors that were given in place of those of the environment are not in the file: `tcs robustify`
+    estimates both kinds of sets then.
+    """
+    record = file.metadata.get("robustness", [None] * len(file.tables))[table]
+    if file.tables[table].success is None or record is None or not record["environment_errors"]:
+        return refined
+    trials = Trials.built(file, table, scorer.built, body_collisions=record["body_collisions"])
+    return with_success(
+        trials, refined, samples=record["samples"], seed=record["seed"], jobs=scorer.jobs
+    )
+
+
+def with_refined(
+    file: ScoreFile, table: int, refined: RefinedTable, settings: dict[str, Any]
+) -> ScoreFile:
+    """Return the file with the refined sets of one table."""
+    tables = list(file.tables)
+    tables[table] = dataclasses.replace(tables[table], refined=refined)
+    records = list(file.metadata.get(KEY, [None] * len(tables)))
+    records[table] = settings
+    return dataclasses.replace(file, metadata={**file.metadata, KEY: records}, tables=tuple(tables))
+
+
+def refinement_summary(file: ScoreFile, table: int | None = None) -> dict[str, Any]:
+    """Return what a refinement gained, as printed by `tcs refine --json`.
+
+    Args:
+        file: A score file with refined sets.
+        table: Number of the refined table; by default the nominal one.
+
+    Raises:
+        SelectionError: If the table was not refined.
+    """
+    number = file.nominal_index if table is None else table
+    scored = file.tables[number]
+    settings = file.metadata.get(KEY, [None] * len(file.tables))[number]
+    if scored.refined is None or settings is None:
+        raise SelectionError("No sets of this table were refined. Refine them: tcs refine FILE.")
+    reachability, manipulability = scored.sets.scores_of(scored.sets.best)
+    refined = scored.refined
+    return {
+        "measure": file.metadata["measure"],
+        **settings,
+        "before": {
+            "reachability": round(reachability, 12),
+            "manipulability": round(manipulability, 12),
+            "members": [file.configurations.configuration(h).to_json() for h in scored.sets.best],
+        },
+        "after": {
+            "reachability": round(float(refined.reachability[0]), 12),
+            "manipulability": round(float(refined.manipulability[0]), 12),
+            "members": [member.to_json() for member in refined.members(file.configurations, 0)],
+        },
+        "sets": len(refined.origin),
+    }

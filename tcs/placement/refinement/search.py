@@ -1,19 +1,150 @@
-"""Local search from sets of the grid: the cells around the members, sampled finer and finer."""
+"""Local search from sets of the grid: the space around it, cells sampled finer and finer."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tcs.kernel.arrays import BoolArray, FloatArray
-from tcs.model.grid import Grid
-from tcs.placement.refinement.objectives import Features, ScoreObjective
+from tcs.model.grid import ROBOT_AXES, Grid
 from tcs.placement.refinement.points import PointScores
-from tcs.placement.refinement.space import Space
+from tcs.placement.tables import SetTable
+from tcs.placement.tables.sets import DISTANCE_TOLERANCE
+
+FULL_TURN = 2.0 * math.pi
+LEAST_CELL = {"m": 0.15, "rad": 0.5}
+"""Least half width of the first cells [m, rad]: a fine grid does not keep the search in a basin."""
+
+
+@dataclass(frozen=True, eq=False)
+class Space:
+    """Every value between the first and the last one of each axis of a grid."""
+
+    low: FloatArray
+    """Least values [m or rad], shape (axes,)."""
+    high: FloatArray
+    """Greatest values, shape (axes,)."""
+    cell: FloatArray
+    """Half widths of the first cells, at least a step of the grid; 0 for an axis that keeps its
+    values, shape (axes,)."""
+    periodic: BoolArray
+    """Whether an axis is a heading that the grid covers all around, shape (axes,)."""
+    min_distance: float
+    """Least base distance of two members of a set [m]."""
+    same_environment: bool
+    """Whether the members of a set share the state of the environment."""
+
+    @classmethod
+    def of(cls, grid: Grid, sets: SetTable | None = None, *, fixed: Collection[str] = ()) -> Self:
+        """Return the space of a grid, with the rules of its sets if there are any.
+
+        Args:
+            grid: The grid.
+            sets: Its sets.
+            fixed: Axes that keep the values of the grid.
+        """
+        values = [axis.values for axis in grid.axes]
+        cell = [
+            max(v[1] - v[0], LEAST_CELL[axis.held_unit])
+            if v.size > 1 and axis.name not in fixed
+            else 0.0
+            for v, axis in zip(values, grid.axes, strict=True)
+        ]
+        return cls(
+            low=np.array([v[0] for v in values]),
+            high=np.array([v[-1] for v in values]),
+            cell=np.array(cell),
+            periodic=np.array(
+                [
+                    axis.name == "base_yaw" and axis.count * axis.step >= 360.0 - 1e-6
+                    for axis in grid.axes
+                ]
+            ),
+            min_distance=0.0 if sets is None else sets.min_distance,
+            same_environment=sets is not None and sets.same_environment,
+        )
+
+    @property
+    def environment_axes(self) -> int:
+        """Number of axes that move the environment; they come first."""
+        return self.cell.size - len(ROBOT_AXES)
+
+    def inside(self, values: FloatArray) -> FloatArray:
+        """Return values moved into the ranges, headings by full turns, shape (..., axes)."""
+        turned = self.low + np.mod(values - self.low, FULL_TURN)
+        return np.where(self.periodic, turned, np.clip(values, self.low, self.high))
+
+    def allowed(self, members: FloatArray) -> BoolArray:
+        """Return which sets are allowed, given their members' values (n, m, axes), shape (n,)."""
+        allowed = np.ones(len(members), dtype=np.bool_)
+        x = len(ROBOT_AXES)  # counted from the end
+        for a in range(members.shape[1]):
+            for b in range(a):
+                apart = members[:, a, -x : -x + 2] - members[:, b, -x : -x + 2]
+                distance = np.hypot(apart[:, 0], apart[:, 1])
+                allowed &= distance >= self.min_distance - DISTANCE_TOLERANCE
+                if self.same_environment:
+                    count = self.environment_axes
+                    allowed &= np.all(members[:, a, :count] == members[:, b, :count], axis=1)
+        return allowed
+
+
+TIE = 1e-3
+"""Weight of P_R + P_M beside the success: decides among sets of equal success, and is less than
+the success of one goal in one of some hundred samples."""
+
+
+class Features(NamedTuple):
+    """What configurations contribute to the objective of a set: the best member counts at each."""
+
+    reached: BoolArray
+    """Shape (n, F)."""
+    dexterity: NDArray[np.float32]
+    """Shape (n, F)."""
+
+
+@dataclass(frozen=True, eq=False)
+class ScoreObjective:
+    """P_R + P_M, TCS eq. (1) and (4): each goal is a feature."""
+
+    weights: FloatArray
+    """Weights of the goals, sum 1, shape (G,)."""
+
+    def features(self, points: FloatArray, scores: PointScores) -> Features:
+        """Return the goals that configurations reach, and their dexterity there."""
+        return Features(scores.reached, scores.dexterity)
+
+    def values(self, features: Features) -> FloatArray:
+        """Return P_R + P_M of sets."""
+        manipulability = features.dexterity.max(axis=1).astype(np.float64) @ self.weights
+        return np.asarray(features.reached.any(axis=1) @ self.weights + manipulability)
+
+
+class Samples(Protocol):
+    """Random changes that are the same for all configurations (common random numbers)."""
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+
+    @property
+    def order(self) -> NDArray[np.intp]:
+        """Numbers of the samples, the largest changes first, shape (samples,)."""
+
+    def hardest(self, count: int) -> Self:
+        """Return the samples with the largest changes."""
+
+    def only(self, rows: NDArray[np.intp]) -> Self:
+        """Return some of the samples."""
+
+    def reached(self, points: FloatArray) -> BoolArray:
+        """Return which goals each configuration reaches in each sample, shape (n, samples, G)."""
+
 
 POINTS_PER_AXIS = 8
 """Random configurations per axis around each member in a round."""

@@ -15,7 +15,7 @@ from tcs.errors import SelectionError, TcsError, UnknownNameError
 from tcs.files.blocks import BlockFolder
 from tcs.model.random_streams import check_draws
 from tcs.placement.robustness.error_model import ErrorModel, Offsets
-from tcs.placement.robustness.pairs import EQUAL_REACHABILITY, uniform_sets
+from tcs.placement.robustness.kept_pairs import EQUAL_REACHABILITY, uniform_sets
 from tcs.placement.robustness.statistics import Mean, mean_of
 from tcs.placement.robustness.trials import Errors, Progress, Trials
 from tcs.placement.store import ScoreFile, StateTables, state_to_json

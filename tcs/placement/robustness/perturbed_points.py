@@ -17,8 +17,7 @@ from tcs.kernel.rows import Rows
 from tcs.kernel.sweep import blocked_grippers
 from tcs.model.grid import ROBOT_AXES
 from tcs.model.scene import environment_at, torso_at
-from tcs.placement.robustness.displacements import displaced, samples_of
-from tcs.placement.robustness.error_model import Offsets
+from tcs.placement.robustness.error_model import Offsets, displaced, samples_of
 from tcs.placement.robustness.perturbed_scenes import HandScenes, PerturbedScenes, Run
 from tcs.placement.robustness.trials import HandTrials, Trials
 from tcs.placement.scoring.approaches import ApproachScorer

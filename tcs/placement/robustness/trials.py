@@ -26,8 +26,7 @@ from tcs.placement.robustness.body_collisions import (
     counted_pairs,
     counted_rests,
 )
-from tcs.placement.robustness.displacements import displaced, samples_of
-from tcs.placement.robustness.error_model import ErrorModel, Offsets
+from tcs.placement.robustness.error_model import ErrorModel, Offsets, displaced, samples_of
 from tcs.placement.robustness.kept_runs import kept_runs, states_digest, trials_key
 from tcs.placement.robustness.perturbed_scenes import BATCH, HandScenes, PerturbedScenes, Run
 from tcs.placement.scoring.approaches import ApproachScorer, approach_lines

@@ -7,13 +7,13 @@ Out: a score file, and its verification.
 from __future__ import annotations
 
 from tcs.files.blocks import BlockFolder
-from tcs.placement.scoring.catalogue import default_path, task_environment_pairs
 from tcs.placement.scoring.job import Job, load_job, whole_task
 from tcs.placement.scoring.kernel_start import warm_up
 from tcs.placement.scoring.live import LiveScorer, score_observed
 from tcs.placement.scoring.offline import score
 from tcs.placement.scoring.rebuild import rebuild_scenes
 from tcs.placement.scoring.score_summary import summary
+from tcs.placement.scoring.score_to_file import default_path, task_environment_pairs
 from tcs.placement.scoring.sets import SetOptions, build_sets
 from tcs.placement.scoring.sweep import Sweep, sweep
 from tcs.placement.scoring.verify import Verification, verify

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -35,9 +36,9 @@ from tcs.model.scene import (
     with_surface_goals,
     without_bodies,
 )
+from tcs.model.scene.environment.environment_file import Obstacle as EnvironmentObstacle
 from tcs.model.tasks import Hand, Task, load_task
-from tcs.placement.constraints import Constraints, kept_conditions
-from tcs.placement.scoring.obstacles import with_obstacles
+from tcs.placement.constraints import Constraints, Obstacle, kept_conditions
 
 _NO_CONSTRAINTS = Constraints()
 BARE = Hand()
@@ -311,3 +312,24 @@ def data_references(job: Job, task: object, environment: object, robot: object) 
             for key, (given, name) in loaded.items()
         },
     }
+
+
+def with_obstacles(environment: EnvironmentFile, blocked: Sequence[Obstacle]) -> EnvironmentFile:
+    """Return an environment with boxes among its obstacles, named blocked_1, blocked_2 and so on.
+
+    Args:
+        environment: The environment.
+        blocked: The boxes, in the environment frame.
+    """
+    taken = {entry.name for entry in environment.placed}
+    names = (name for i in itertools.count(1) if (name := f"blocked_{i}") not in taken)
+    added = tuple(
+        EnvironmentObstacle(
+            name=name,
+            xyz=(box.x, box.y, float(box.centre[2])),
+            rpy_deg=(0.0, 0.0, math.degrees(box.yaw)),
+            box=(box.width, box.depth, box.z_high - box.z_low),
+        )
+        for name, box in zip(names, blocked, strict=False)
+    )
+    return environment.model_copy(update={"obstacles": (*environment.obstacles, *added)})

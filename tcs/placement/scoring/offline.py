@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple, Unpack
 
+import numpy as np
+
+from tcs.errors import RobotError
 from tcs.files.blocks import BlockFolder
+from tcs.files.mapped import chunks
+from tcs.kernel.arrays import FloatArray, SceneArrays, Shapes
 from tcs.kernel.dexterity import DEFAULT_MEASURE, dexterity
 from tcs.model.grid import Grid
 from tcs.model.people import PersonLike
 from tcs.model.robots import BOTH, RobotFile, arm_references
-from tcs.model.scene import EnvironmentFile, Scene, body_frame_positions
-from tcs.model.tasks import Goal, Task, ToolLine
+from tcs.model.scene import EnvironmentFile, Scene, SceneSpec, body_frame_positions
+from tcs.model.tasks import Goal, Task, ToolLine, partners
 from tcs.placement.constraints import (
     Constraints,
     Footprint,
@@ -26,16 +31,16 @@ from tcs.placement.constraints import (
 )
 from tcs.placement.scoring.approaches import ApproachChoice, approach_lines, choose_approach
 from tcs.placement.scoring.engines import ScoringEngine
-from tcs.placement.scoring.hands import score_hands
-from tcs.placement.scoring.job import Job, JobOptions, data_references, load_jobs
-from tcs.placement.scoring.kept_sets import kept_sets
+from tcs.placement.scoring.hands import digest_of_hands, joined
+from tcs.placement.scoring.job import BARE, Job, JobOptions, data_references, load_jobs, whole_task
+from tcs.placement.scoring.kernel_start import ANALYTIC, NUMERIC
 from tcs.placement.scoring.person import person_entry
-from tcs.placement.scoring.robot_shapes import robot_shapes
-from tcs.placement.scoring.self_contact import prevailing_self_contact
-from tcs.placement.scoring.sets import SetOptions, checked_options
+from tcs.placement.scoring.sets import SetOptions, checked_options, kept_sets
 from tcs.placement.scoring.sweep import sweep
-from tcs.placement.store import ScoreFile, StateTables
-from tcs.placement.tables import ScoreTable
+from tcs.placement.scoring.together import Hands, together
+from tcs.placement.store import ARMS, HANDS, OF_HAND, ScoreFile, StateTables
+from tcs.placement.store.robot_shapes import Primitives, RobotShapes
+from tcs.placement.tables import Reason, ScoreTable
 
 NO_CONSTRAINTS = Constraints()
 WITHOUT = ApproachChoice(False)
@@ -323,6 +328,92 @@ def score_setups(
     return setup.file_of(tables, setup.job.grid, begun, {**entries, **(metadata or {})})
 
 
+def score_hands(
+    setups: Sequence[ScoringSetup],
+    *,
+    begun: float,
+    on_progress: Callable[[int, int], None] | None = None,
+    on_compile: Callable[[], None] | None = None,
+    metadata: Mapping[str, Any] | None = None,
+) -> ScoreFile:
+    """Score the goals of each hand, and return one file with all goals of each configuration.
+
+    Args:
+        setups: The job of each hand.
+        begun: Start of the work, by `time.perf_counter` [s].
+        on_progress: Called with the number of scored configurations and their total.
+        on_compile: Called before the kernel compiles, if it has to.
+        metadata: Further entries of the file's metadata.
+
+    Raises:
+        RobotError: If the arms have different grids: one has a torso joint, another has not.
+    """
+    jobs = [setup.job for setup in setups]
+    for job in jobs:
+        if job.grid != jobs[0].grid:
+            raise RobotError(
+                f"robots '{jobs[0].spec.robot.name}' and '{job.spec.robot.name}' have different "
+                "torso joints, so no configuration serves the goals of both. Score them one by one."
+            )
+    size = jobs[0].scored_grid.size
+    parts = [
+        setup.scored(
+            on_progress=_shifted(on_progress, number * size, len(setups) * size),
+            on_compile=on_compile,
+        )
+        for number, setup in enumerate(setups)
+    ]
+    task = whole_task(jobs)
+    numbers = [job.goal_numbers for job in jobs]
+    states = [list(of_state) for of_state in zip(*(part.tables for part in parts), strict=True)]
+    if any(partner is not None for partner in partners(task.goals)):
+        built = [(setup.job, setup.job.lowered(setup.scene)) for setup in setups]
+        hands = Hands.of(built, setups[0].measure)
+        rows = jobs[0].grid.size
+        states = [
+            together(of_state, hands, first_row=state * rows, jobs=setups[0].jobs)
+            for state, of_state in enumerate(states)
+        ]
+    tables = [joined(of_state, numbers, task.weights) for of_state in states]
+    spec = SceneSpec(jobs[0].given_robot, jobs[0].spec.environment)
+    whole = replace(jobs[0], task=task, spec=spec, hand=BARE, goal_numbers=())
+    entries = {**_entries(jobs, parts), **(metadata or {})}
+    return replace(setups[0], job=whole).file_of(tables, whole.grid, begun, entries)
+
+
+def _entries(jobs: Sequence[Job], parts: Sequence[Scored]) -> dict[str, Any]:
+    """Return the entries of the metadata: those of each hand, and what sums them up."""
+    of_hands = [
+        {
+            **job.hand.to_json(),
+            "goals": list(job.goal_numbers),
+            "description": job.spec.robot.model_dump(mode="json"),
+            **{key: part.entries[key] for key in OF_HAND if key in part.entries},
+        }
+        for job, part in zip(jobs, parts, strict=True)
+    ]
+    contacts = (entry["self_contact"] for entry in of_hands)
+    timings = [part.entries["timings"] for part in parts]
+    return {
+        **{key: value for key, value in parts[0].entries.items() if key not in OF_HAND},
+        **({ARMS: BOTH} if jobs[0].any_arm else {}),
+        HANDS: of_hands,
+        "scene_digest": digest_of_hands([entry["scene_digest"] for entry in of_hands]),
+        "ik": NUMERIC if any(entry["ik"] == NUMERIC for entry in of_hands) else ANALYTIC,
+        "self_contact": next((contact for contact in contacts if contact is not None), None),
+        "timings": {key: sum(of_hand[key] for of_hand in timings) for key in timings[0]},
+    }
+
+
+def _shifted(
+    on_progress: Callable[[int, int], None] | None, done: int, total: int
+) -> Callable[[int, int], None] | None:
+    """Return a report of progress that counts from `done` to `total`."""
+    if on_progress is None:
+        return None
+    return lambda more, _: on_progress(done + more, total)
+
+
 def _task_as_dict(task: Task) -> dict[str, Any]:
     """Return a task as plain containers."""
     return {
@@ -369,3 +460,132 @@ def _poses_as_dicts(goal: Goal) -> list[dict[str, Any]]:
 def _line_as_dict(line: ToolLine) -> dict[str, Any]:
     """Return a straight tool motion as in a task file."""
     return {"direction": list(line.direction), "distance": line.distance}
+
+
+MAX_SHAPES = 2000
+"""Most shapes that are stored: twenty times those of the largest robot that ships."""
+
+SAME = 1e-9
+"""Greatest difference [m] between a shape and its place under a torso that only translates."""
+
+
+def robot_shapes(arrays: SceneArrays) -> RobotShapes | None:
+    """Return the robot's shapes, or None if there are too many or the torso does not translate.
+
+    Args:
+        arrays: The lowered scene.
+    """
+    if len(arrays.arm.type) + len(arrays.body.type) > MAX_SHAPES:
+        return None
+    torso_shift = _torso_shift(arrays)
+    if torso_shift is None:
+        return None
+    return RobotShapes(
+        chain_R=arrays.chain.R,
+        chain_p=arrays.chain.p,
+        arm_base_R=arrays.arm_base_R[0],
+        arm_base_p=arrays.arm_base_p[0],
+        torso_shift=torso_shift,
+        arm=_primitives(arrays.arm),
+        body=_primitives(arrays.body),
+        margin=float(arrays.margin),
+        slides=arrays.chain.slides,
+        coupled=arrays.chain.coupled,
+        rest=arrays.rest,
+    )
+
+
+def _torso_shift(arrays: SceneArrays) -> FloatArray | None:
+    """Return the displacement of the torso at each level, shape (levels, 3), if it translates."""
+    torso_shift: FloatArray = arrays.arm_base_p - arrays.arm_base_p[0]
+    moved = arrays.body.p[0] + (arrays.body.frame == 1)[None, :, None] * torso_shift[:, None]
+    same = (
+        np.allclose(moved, arrays.body.p, rtol=0.0, atol=SAME)
+        and np.allclose(arrays.body.R, arrays.body.R[0], rtol=0.0, atol=SAME)
+        and np.allclose(arrays.arm_base_R, arrays.arm_base_R[0], rtol=0.0, atol=SAME)
+    )
+    return torso_shift if same else None
+
+
+def _primitives(shapes: Shapes) -> Primitives:
+    return Primitives(
+        type=shapes.type.astype(np.int64),
+        size=shapes.size,
+        pad=shapes.pad,
+        frame=shapes.frame.astype(np.int64),
+        R=shapes.R[0],
+        p=shapes.p[0],
+    )
+
+
+FEWEST = 20
+"""Fewest refusals by one pair that count: fewer occur by chance on a small grid."""
+
+
+@dataclass(frozen=True, slots=True)
+class SelfContact:
+    """A pair of robot bodies that refuses more goals than the robot reaches.
+
+    Attributes:
+        bodies: Names of the bodies.
+        refused: Number of pairs of configuration and goal for which it is the contact found.
+        reached: Number of pairs reached.
+    """
+
+    bodies: tuple[str, str]
+    refused: int
+    reached: int
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the contact as plain containers."""
+        return {"bodies": list(self.bodies), "refused": self.refused, "reached": self.reached}
+
+    def advice(self, robot: RobotFile) -> str:
+        """Return what the contact means and what to change in a robot file, in one line."""
+        first, second = self.bodies
+        limits = (
+            "; pairs exempt within the soft limits only are checked under 'limits: hard'"
+            if robot.limits == "hard" and any(g.limits == "soft" for g in robot.disabled_groups)
+            else ""
+        )
+        return (
+            f"contact of '{first}' with '{second}' of robot '{robot.name}' refuses "
+            f"{self.refused:,} pairs of configuration and goal, more than the {self.reached:,} "
+            "reached. If the two cannot touch, list them under disabled_groups, or reduce "
+            f"self_margin ({robot.self_margin:g} m){limits}."
+        )
+
+
+def prevailing_self_contact(
+    tables: Iterable[ScoreTable], robot_bodies: Collection[str]
+) -> SelfContact | None:
+    """Return the pair of robot bodies that refuses more goals than are reached, None without one.
+
+    The scores hold a contact for every goal that the arm or the gripper is refused, so counting
+    them costs milliseconds. A robot that moves freely refuses few goals by self-collision: with the
+    shipped robots the most frequent pair refuses at most a fiftieth of the number reached. A pair
+    whose shapes touch in every posture refuses nearly all that are within reach.
+
+    Args:
+        tables: Scores of every observed state.
+        robot_bodies: Names of the robot's bodies.
+    """
+    refused: dict[tuple[str, str], int] = {}
+    reached = 0
+    for scores in tables:
+        reached += int(scores.reached.sum())
+        counts = np.zeros(len(scores.pair_names), dtype=np.int64)
+        for rows in chunks(scores.reason, scores.pair):
+            arm = np.isin(
+                scores.reason[rows], (Reason.ARM_BLOCKED, Reason.GRIPPER_BLOCKED_BY_ROBOT)
+            )
+            counts += np.bincount(scores.pair[rows][arm], minlength=len(counts))
+        for bodies, count in zip(scores.pair_names, counts.tolist(), strict=True):
+            if bodies[1] in robot_bodies:
+                refused[bodies] = refused.get(bodies, 0) + count
+    if not refused:
+        return None
+    worst = max(refused, key=lambda bodies: refused[bodies])
+    if refused[worst] < FEWEST or refused[worst] <= reached:
+        return None
+    return SelfContact(worst, refused[worst], reached)

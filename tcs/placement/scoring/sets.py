@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 from typing import TypedDict, Unpack
 
@@ -10,10 +12,12 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from tcs.errors import TcsError
+from tcs.files.blocks import BlockFolder
+from tcs.files.mapped import chunks
 from tcs.kernel.arrays import IntArray
 from tcs.kernel.sets.pairs import BestPairs, CellPairs, MemberPairs, SetArrays, bound_cells
 from tcs.model.grid import ROBOT_AXES, Grid
-from tcs.placement.scoring.base_lattice import lattice_of
+from tcs.model.program import program_digest
 from tcs.placement.scoring.thinning import (
     MOST_CANDIDATES,
     TILE,
@@ -24,17 +28,81 @@ from tcs.placement.scoring.thinning import (
     undominated,
 )
 from tcs.placement.scoring.triples import kept_triples
-from tcs.placement.tables import ScoreTable, SetTable, tc_manipulability, tc_reachability
-from tcs.placement.tables.groups import Groups
-from tcs.placement.tables.rounding import float32_above
-from tcs.placement.tables.rules import (
+from tcs.placement.store.encoding import decode_sets, encode_sets
+from tcs.placement.tables import (
+    BaseLattice,
+    ScoreTable,
+    SetTable,
+    tc_manipulability,
+    tc_reachability,
+)
+from tcs.placement.tables.equations import float32_above
+from tcs.placement.tables.sets import (
+    DISTANCE_TOLERANCE,
+    MOST_MEMBERS,
+    MOVES,
+    Groups,
     candidates_of,
     check_rule,
     order_keys,
     pair_limits,
     spaced_places,
 )
-from tcs.placement.tables.sets import DISTANCE_TOLERANCE, MOST_MEMBERS
+
+BORDER = 0.6
+"""Distance by which obstacles at the border of the grid are extended beyond it [m]. The grid has
+no data there, and the paper's grid ends at the foot end of the bed: half a PR2 and the end of the
+bed are 0.6 m."""
+
+STEP = 0.1
+"""Distance of neighbours along an axis on which the grid has a single value [m]."""
+
+
+def lattice_of(scores: ScoreTable, grid: Grid) -> BaseLattice:
+    """Return the lattice of the base positions of a grid and its surroundings.
+
+    The base can move to a neighbour if, in some state of the environment and with some heading and
+    torso height, its body is free of contact at both positions; diagonally if also at the two
+    positions beside the diagonal. At each position the robot may turn, move its torso and have the
+    environment set. Positions are checked, not the path between them. Configurations that a
+    constraint excluded count as in contact.
+
+    Args:
+        scores: Scores of every configuration of the grid.
+        grid: The grid.
+    """
+    # Nothing is known about the body where a configuration was not scored.
+    blocked = scores.has_no_free_body
+    names = list(ROBOT_AXES)
+    x, y = names.index("base_x") - len(names), names.index("base_y") - len(names)
+    free = np.moveaxis(~blocked.reshape(grid.shape), (x, y), (-2, -1))
+    free = free.reshape(-1, *free.shape[-2:])
+    axes = [grid.axis(name) for name in ("base_x", "base_y")]
+    known = [axis.step for axis in axes if axis.count > 1] or [STEP]
+    step = [axis.step if axis.count > 1 else known[0] for axis in axes]
+    border = [math.ceil(BORDER / s - 1e-9) for s in step]  # 0.6 / 0.1 rounds to less than 6
+    free = np.pad(free, ((0, 0), (border[0],) * 2, (border[1],) * 2), mode="edge")
+    # Beyond that everything is free, which one ring of positions represents.
+    free = np.pad(free, ((0, 0), (1, 1), (1, 1)), constant_values=True)
+    shape = free.shape[-2:]
+    moves = np.zeros((len(MOVES), *shape), dtype=np.bool_)
+    for along, (dx, dy) in zip(moves, MOVES, strict=True):
+        low, high = max(0, -dy), shape[1] - max(0, dy)
+        rows, columns = {0, dx}, {0, dy}
+        possible = np.ones((len(free), shape[0] - dx, high - low), dtype=np.bool_)
+        for i in rows:
+            for j in columns:
+                possible &= free[:, i : shape[0] - dx + i, low + j : high + j]
+        along[: shape[0] - dx, low:high] = possible.any(axis=0)
+    return BaseLattice(
+        start=(
+            axes[0].start - (border[0] + 1) * step[0],
+            axes[1].start - (border[1] + 1) * step[1],
+        ),
+        step=(step[0], step[1]),
+        moves=moves,
+    )
+
 
 CELLS_PER_SLICE = 16
 """Small enough for an even load (early cells have more partners than late ones) and small buffers;
@@ -45,7 +113,7 @@ class SetOptions(TypedDict, total=False):
     """Options of the kept sets, for every function with `**sets`."""
 
     rule: str
-    """One of `tcs.placement.tables.rules.RULES`. "paper", the default: singles that reach a goal,
+    """One of `tcs.placement.tables.sets.RULES`. "paper", the default: singles that reach a goal,
     pairs whose P_M is greater than the best P_M of a single, and triples whose P_M is greater than
     the best P_M of a pair and of a single. "code2015": the rules of hrl_base_selection,
     without triples."""
@@ -391,3 +459,48 @@ def _with_triples(
     if total > so_far:
         best = tuple(int(h) for h in candidates[list(members)])
     return triples, best
+
+
+_NAME = "sets"
+
+
+def kept_sets(
+    blocks: BlockFolder | None,
+    scores: ScoreTable,
+    grid: Grid,
+    *,
+    jobs: int,
+    **options: Unpack[SetOptions],
+) -> SetTable:
+    """Return the sets of scores as `build_sets` does, from a folder of blocks if they are there.
+
+    Args:
+        blocks: The folder; None to build the sets and keep nothing.
+        scores: Scores of every configuration of the grid.
+        grid: The grid.
+        jobs: Number of threads.
+        **options: Options of the kept sets, all of them.
+
+    Raises:
+        OutputError: If the block cannot be written, or another process builds the same sets.
+        TcsError: As `build_sets`.
+    """
+    if blocks is None:
+        return build_sets(scores, grid, jobs=jobs, **options)
+    with blocks.opened(_key(scores, grid, options)) as opened:
+        found = opened.load(_NAME, lambda content: decode_sets(content, grid))
+        if found is None:
+            found = build_sets(scores, grid, jobs=jobs, **options)
+            opened.save(_NAME, encode_sets(found))
+        return found
+
+
+def _key(scores: ScoreTable, grid: Grid, options: SetOptions) -> str:
+    """Return the hash of everything that sets follow from."""
+    plain = json.dumps([grid.to_dict(), options], sort_keys=True)
+    sha = hashlib.sha256(f"sets\0{program_digest()}\0{plain}\0".encode())
+    sha.update(scores.weights.tobytes())
+    for rows in chunks(scores.reason, scores.dexterity):
+        sha.update(scores.reason[rows].tobytes())
+        sha.update(scores.dexterity[rows].tobytes())
+    return sha.hexdigest()

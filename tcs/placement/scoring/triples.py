@@ -12,8 +12,8 @@ from tcs.errors import TcsError
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.sets.pairs import BestPairs, MemberPairs, SetArrays
 from tcs.kernel.sets.triples import KeptTriples, fill_pairs, find_triples
-from tcs.placement.tables.groups import Groups
-from tcs.placement.tables.rounding import float32_above
+from tcs.placement.tables.equations import float32_above
+from tcs.placement.tables.sets import Groups
 
 MOST_CANDIDATES = 16_000
 """Greatest number of candidates: the search keeps the P_M of all pairs, 1 GB for this many."""

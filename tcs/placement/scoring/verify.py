@@ -20,10 +20,11 @@ from tcs.placement.scoring.drake_check import (
     ROTATION_BAR,
     Finding,
 )
-from tcs.placement.scoring.file_checker import FileChecker, RefinedPair
-from tcs.placement.scoring.strata import (
+from tcs.placement.scoring.file_checker import (
     OF_PAIRS,
     STRATA,
+    FileChecker,
+    RefinedPair,
     Stratum,
     count_of,
     estimated_recall,

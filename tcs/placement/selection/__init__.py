@@ -6,14 +6,12 @@ stored set with the greatest utility, in milliseconds, without Drake or a compil
 
 from __future__ import annotations
 
+from tcs.placement.selection.admission import Executability, scores_at_limbs
 from tcs.placement.selection.alternatives import Top
-from tcs.placement.selection.best import select
+from tcs.placement.selection.best import same_set, select
 from tcs.placement.selection.choice import Choice, SelectionTables
-from tcs.placement.selection.executable import Executability
-from tcs.placement.selection.limbs import scores_at_limbs
 from tcs.placement.selection.observed import Match, nearest_table
 from tcs.placement.selection.travel import TravelWeights, shortest_tour
-from tcs.placement.selection.uncertain_base import same_set
 from tcs.placement.selection.utility import PAPER_WEIGHTS, UtilityWeights, utility
 
 __all__ = [

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -12,21 +13,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import SelectionError
-from tcs.model.grid import InitialConfiguration
+from tcs.model.grid import Grid, InitialConfiguration
+from tcs.model.random_streams import check_draws, named_generator
 from tcs.placement.constraints import Constraints, disliked_candidates
-from tcs.placement.selection.admission import Admitted, admitted_candidates
+from tcs.placement.selection.admission import (
+    Admitted,
+    admitted_at_limbs,
+    admitted_candidates,
+    admitted_executable,
+    motions_at,
+)
 from tcs.placement.selection.alternatives import Distinct, Top
 from tcs.placement.selection.bounds import Bounds
 from tcs.placement.selection.choice import Choice, SelectionTables, changed_axes
-from tcs.placement.selection.coverage import warning_outside
+from tcs.placement.selection.distances import ON_EDGE, LatticeDistances
 from tcs.placement.selection.estimated import (
     Candidates,
     best_estimated,
     check_estimated,
     none_estimated,
 )
-from tcs.placement.selection.executable import admitted_executable, motions_at
-from tcs.placement.selection.limbs import admitted_at_limbs
 from tcs.placement.selection.observed import Match, nearest_table
 from tcs.placement.selection.penalties import Penalties, penalties_of
 from tcs.placement.selection.ranking import Ranking, ranking_of
@@ -473,3 +479,91 @@ class _ChosenSet:
     members: tuple[InitialConfiguration, ...]
     reachability: float
     manipulability: float
+
+
+def warning_outside(
+    legs: Legs, here: InitialConfiguration, cells: tuple[int, ...], grid: Grid
+) -> str | None:
+    """Return a warning if the path around the furniture leaves the grid, else None.
+
+    Args:
+        legs: Travel from the current state, by either route; a straight path, which ignores the
+            furniture, causes no warning.
+        here: The current state.
+        cells: Base cells of the members, in the order of the tour.
+        grid: The scored grid.
+    """
+    distances = legs.distances
+    if not isinstance(distances, LatticeDistances):
+        return None
+    axes = (grid.axis("base_x"), grid.axis("base_y"))
+    low = np.array([axis.values[0] for axis in axes])
+    high = np.array([axis.values[-1] for axis in axes])
+    covered = f"x {low[0]:g} to {high[0]:g} m, y {low[1]:g} to {high[1]:g} m"
+    start = np.array([here.base_x, here.base_y])
+    if np.any((start < low - ON_EDGE) | (start > high + ON_EDGE)):
+        return (
+            f"The path around the furniture starts outside the scored grid ({covered}), where the "
+            "scores do not show what blocks the base."
+        )
+    metres = [float(legs.here_to_cell[cells[0]]) / legs.metre if legs.metre else np.inf]
+    metres += [
+        float(distances.between(np.array(one), np.array(other)))
+        for one, other in itertools.pairwise(cells)
+    ]
+    stops = np.concatenate([start[None], distances.cell_xy[list(cells)]])
+    to_edge = np.minimum(stops - low, high - stops).min(axis=1)
+    # A leg that is too short to reach the edge and return needs no search.
+    if np.all(np.array(metres) <= to_edge[:-1] + to_edge[1:]):
+        return None
+    path = distances.path(float(start[0]), float(start[1]), cells, low, high)
+    outside = np.any((path < low - ON_EDGE) | (path > high + ON_EDGE), axis=1)
+    if not np.any(outside):
+        return None
+    x, y = path[int(np.argmax(outside))]
+    return (
+        f"The path around the furniture leaves the scored grid ({covered}) at ({x:.2f}, {y:.2f}) "
+        "m; beyond it the scores do not show what blocks the base."
+    )
+
+
+def same_set(
+    choose: Callable[[InitialConfiguration], Choice],
+    here: InitialConfiguration,
+    covariance: NDArray[np.float64],
+    *,
+    draws: int = 100,
+    seed: int = 0,
+) -> float:
+    """Return the fraction of random current base poses from which the same set is selected.
+
+    Args:
+        choose: Returns the choice from a state.
+        here: The estimated state.
+        covariance: Covariance of x, y and yaw of the base in the environment frame [m, rad], shape
+            (3, 3).
+        draws: Number of base poses, drawn from a normal distribution.
+        seed: Seed of the random numbers.
+
+    Raises:
+        SelectionError: If no set can be selected from `here`.
+        TcsError: If the number of draws or the seed is out of range.
+    """
+    check_draws(draws, seed)
+    selected = choose(here).indices
+    values, axes = np.linalg.eigh(covariance)
+    normal = named_generator(seed, "located base").standard_normal((draws, 3))
+    same = 0
+    for x, y, yaw in normal @ (axes * np.sqrt(np.maximum(values, 0.0))).T:
+        moved = replace(
+            here,
+            base_x=here.base_x + float(x),
+            base_y=here.base_y + float(y),
+            base_yaw=here.base_yaw + float(yaw),
+        )
+        try:
+            same += choose(moved).indices == selected
+        except SelectionError:
+            # From there, no set can be selected.
+            continue
+    return same / draws

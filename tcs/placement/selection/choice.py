@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from tcs.errors import SelectionError
 from tcs.model.grid import Grid, InitialConfiguration
 from tcs.placement.constraints import SAME_VALUE, Footprint, Postures
-from tcs.placement.selection.admission import Left
 from tcs.placement.selection.alternatives import SetPositions
 from tcs.placement.selection.index import SetIndex
 from tcs.placement.selection.observed import Match
@@ -154,6 +153,26 @@ def _frames(file: ScoreFile, table: int) -> dict[str, FloatArray]:
     """Return the positions of the body frames of a table [m], shapes (states, 3)."""
     count = len(file.tables)
     return {name: np.reshape(at, (count, -1, 3))[table] for name, at in file.body_frames.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class Left:
+    """What a constraint and those before it leave."""
+
+    constraint: str
+    """The constraint, e.g. "keep bed_height"."""
+    configurations: int
+    """Number of candidates."""
+    solutions: int | None = None
+    """Number of their stored solutions, for obstacles."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the numbers as plain containers."""
+        plain: dict[str, Any] = {
+            "constraint": self.constraint,
+            "configurations": self.configurations,
+        }
+        return plain if self.solutions is None else {**plain, "solutions": self.solutions}
 
 
 @dataclass(frozen=True, kw_only=True)

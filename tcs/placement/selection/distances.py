@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from tcs.errors import SelectionError
 from tcs.placement.tables import BaseLattice
-from tcs.placement.tables.base_lattice import MOVES
+from tcs.placement.tables.sets import MOVES
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.integer[Any]]

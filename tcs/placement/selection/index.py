@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tcs.placement.selection.distances import Distances, LatticeDistances, StraightDistances
 from tcs.placement.tables import SetTable
-from tcs.placement.tables.groups import Groups
+from tcs.placement.tables.sets import Groups
 
 KEPT_WEIGHTS = 16
 """Most weights of selection for which values over the groups are kept, a kilobyte for each."""

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from tcs.errors import SelectionError, UnknownNameError
 from tcs.model.grid import Grid, InitialConfiguration
-from tcs.placement.selection.checks import check_coordinate, check_weight, check_within_axis
 from tcs.placement.selection.distances import ROUTES, Distances
+from tcs.placement.selection.utility import check_coordinate, check_weight, check_within_axis
 
 FloatArray = NDArray[np.float64]
 

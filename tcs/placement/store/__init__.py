@@ -5,8 +5,7 @@ They are read through an allow-list.
 
 from __future__ import annotations
 
-from tcs.placement.store.encoding import FORMAT, FORMAT_VERSION
-from tcs.placement.store.files import load_scores, save_scores
+from tcs.placement.store.encoding import FORMAT, FORMAT_VERSION, load_scores, save_scores
 from tcs.placement.store.motion_file import (
     MotionFile,
     load_motions,

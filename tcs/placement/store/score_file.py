@@ -17,8 +17,7 @@ from tcs.files.plain import plain
 from tcs.model.grid import Axis, Grid
 from tcs.placement.store.robot_shapes import RobotShapes
 from tcs.placement.tables import RefinedTable, ScoreTable, SetTable, SuccessTable
-from tcs.placement.tables.rules import candidates_of
-from tcs.placement.tables.sets import DISTANCE_TOLERANCE
+from tcs.placement.tables.sets import DISTANCE_TOLERANCE, candidates_of
 from tcs.placement.tables.success import NO_MEMBER
 
 REQUIRED_METADATA: dict[str, type] = {

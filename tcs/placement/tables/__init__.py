@@ -6,12 +6,11 @@ read-only arrays, and the equations over them; numpy only.
 
 from __future__ import annotations
 
-from tcs.placement.tables.base_lattice import BaseLattice
 from tcs.placement.tables.equations import tc_manipulability, tc_reachability
 from tcs.placement.tables.motions import MotionOutcome, MotionTable
 from tcs.placement.tables.refined import RefinedSet, RefinedSuccess, RefinedTable
 from tcs.placement.tables.scores import Reason, ScoreTable
-from tcs.placement.tables.sets import SetTable
+from tcs.placement.tables.sets import BaseLattice, SetTable
 from tcs.placement.tables.success import SuccessTable
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""The set table: every set of initial configurations to choose from.
+"""Sets of configurations: rules which are kept, their groups by base cells, and the lattice.
 
 Pairs of configurations come in tens of millions, so they are not listed. They
 are grouped by the two base cells (x-y places) of their members, and for each
@@ -9,17 +9,248 @@ because the score of a pair follows from the dexterity of its two members.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.placement.tables.base_lattice import BaseLattice
+from tcs.errors import UnknownNameError
 from tcs.placement.tables.checks import ArrayTable, Shapes, length_of, require
 from tcs.placement.tables.equations import tc_manipulability, tc_reachability
-from tcs.placement.tables.groups import Groups
-from tcs.placement.tables.rules import RULES, PairLimits, pair_limits
+
+MOVES = ((1, 0), (0, 1), (1, 1), (1, -1))
+"""Steps along x and y of the four types of moves; each also goes backward."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BaseLattice(ArrayTable):
+    """X by Y base positions, and the straight moves between neighbours.
+
+    The lattice extends beyond the base positions of the grid. The area beyond the lattice is free.
+    """
+
+    start: tuple[float, float]
+    """x and y of the first position in W [m]."""
+    step: tuple[float, float]
+    """Distance of neighbours along x and along y [m]; positive."""
+    moves: NDArray[np.bool_]
+    """Whether the base can move from position (i, j) by each of `MOVES`, shape (4, X, Y)."""
+
+    def __post_init__(self) -> None:
+        """Check the lattice and make its array read-only.
+
+        Raises:
+            TcsError: If a number is not finite, a step not positive, there are fewer than two
+                positions along an axis, or a move leaves the lattice.
+        """
+        self._check_arrays("base lattice", {"moves": (np.bool_, (len(MOVES), None, None))})
+        numbers = (*self.start, *self.step)
+        require(
+            len(self.start) == len(self.step) == 2
+            and all(isinstance(value, float) and abs(value) < np.inf for value in numbers)
+            and min(self.step) > 0.0,
+            "base lattice: start and step must be two finite numbers each, the steps positive.",
+        )
+        require(min(self.shape) >= 2, "base lattice: needs at least two positions along each axis.")
+        for along, (dx, dy) in zip(self.moves, MOVES, strict=True):
+            leaving = np.ones(self.shape, dtype=np.bool_)
+            leaving[: self.shape[0] - dx, max(0, -dy) : self.shape[1] - max(0, dy)] = False
+            require(not np.any(along & leaving), "base lattice: a move leaves the lattice.")
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of positions along x and y."""
+        return self.moves.shape[1], self.moves.shape[2]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Groups(ArrayTable):
+    """Kept sets of m members: K groups, each with the same m base cells; read-only.
+
+    The score of any set follows from its members, so a group holds bounds only.
+    """
+
+    least: float
+    """Least P_M of a kept set."""
+    cells: NDArray[np.int32]
+    """Cells of the members, ascending, with at least one kept set; lexicographic, shape (K, m)."""
+    count: NDArray[np.int64]
+    """Number of kept sets in each group, shape (K,)."""
+    reachability: NDArray[np.float64]
+    """Greatest P_R of those sets, exact, shape (K,)."""
+    manipulability: NDArray[np.float32]
+    """Greatest P_M of those sets, rounded upward, shape (K,)."""
+    total: NDArray[np.float32]
+    """Greatest P_R + P_M of those sets, rounded upward, shape (K,)."""
+    member_reachability: NDArray[np.float64]
+    """Greatest P_R of the kept sets that a candidate is in, exact, 0 if in none, shape (C,)."""
+    member_manipulability: NDArray[np.float32]
+    """Greatest P_M of those sets, rounded upward, shape (C,)."""
+    member_total: NDArray[np.float32]
+    """Greatest P_R + P_M of those sets, rounded upward, shape (C,)."""
+
+    def __post_init__(self) -> None:
+        """Check the arrays against each other and make them read-only.
+
+        Raises:
+            TcsError: If an array has the wrong type, shape or range.
+        """
+        kept, members = length_of(self.cells), length_of(self.member_reachability)
+        bounds = {"reachability": np.float64, "manipulability": np.float32, "total": np.float32}
+        shapes: Shapes = {
+            "cells": (np.int32, (kept, None)),
+            "count": (np.int64, (kept,)),
+            **{name: (dtype, (kept,)) for name, dtype in bounds.items()},
+            **{f"member_{name}": (dtype, (members,)) for name, dtype in bounds.items()},
+        }
+        self._check_arrays("groups of sets", shapes)
+        for name in BOUNDS:
+            bound = getattr(self, name)
+            require(
+                bool(np.all((bound >= 0.0) & (bound < np.inf))),
+                f"groups of sets: {name} must be finite and >= 0.",
+            )
+        require(0.0 <= self.least < np.inf, "groups of sets: least must be finite and >= 0.")
+
+    def check(self, size: NDArray[np.int64]) -> None:
+        """Check the groups against the number of candidates of each cell.
+
+        Args:
+            size: Number of candidates of each cell, shape (N,).
+
+        Raises:
+            TcsError: If groups are out of order, of cells that do not exist, or have too many sets.
+        """
+        cells = self.cells.astype(np.int64)
+        number = np.zeros(len(cells), dtype=np.int64)
+        most = np.ones(len(cells))
+        require(
+            bool(np.all((cells >= 0) & (cells < size.size)))
+            and bool(np.all(np.diff(cells, axis=1) >= 0)),
+            f"groups of sets: cells must be ascending in each, within 0..{size.size - 1}.",
+        )
+        for column in cells.T:
+            number = number * size.size + column
+            most *= size[column]
+        require(bool(np.all(np.diff(number) > 0)), "groups of sets: cells must be lexicographic.")
+        require(
+            bool(np.all((self.count > 0) & (self.count <= most))),
+            "groups of sets: count does not fit the number of candidates in the cells.",
+        )
+        require(
+            self.member_reachability.size == int(size.sum()),
+            "groups of sets: needs a bound for each candidate.",
+        )
+
+    @property
+    def kept(self) -> int:
+        """Number of kept sets."""
+        return int(self.count.sum())
+
+
+_NOT_BOUNDS = ("least", "cells", "count")
+BOUNDS = tuple(field.name for field in fields(Groups) if field.name not in _NOT_BOUNDS)
+"""Names of the arrays that bound scores."""
+
+
+RULES = ("paper", "code2015")
+"""Names of the rules. "paper": singles that reach at least one goal; larger sets whose P_M is
+greater than the best P_M of any smaller set (TCS section IV-A). "code2015": the rules of
+hrl_base_selection in gt-ros-pkg/hrl-assistive (BSD), state of 30 April 2015; see `CODE2015`."""
+
+FRACTION_TOLERANCE = 1e-9
+"""Tolerance of a fraction of the goals: two fifths can add up to one bit less than 0.40."""
+
+
+@dataclass(frozen=True, slots=True)
+class Code2015:
+    """The constants of hrl_base_selection that decide which sets are kept."""
+
+    least_single: float = 0.40
+    """Least P_R of a single."""
+    reachability: float = 0.98
+    """Least P_R of a pair, as a multiple of the best single's P_R."""
+    manipulability: float = 1.01
+    """Least P_M of a pair, as a multiple of the best single's P_M."""
+    gain: float = 1.01
+    """Least P_M of a pair, as a multiple of each member's own P_M."""
+    decimals: int = 3
+    """Number of decimals to which base x and y [m] are rounded before distances are computed."""
+
+
+CODE2015 = Code2015()
+"""The best single is the first in descending order of P_R, then P_M; so is the best set."""
+
+
+@dataclass(frozen=True, slots=True)
+class PairLimits:
+    """Least scores of a kept pair; all three conditions must hold."""
+
+    reachability: float
+    """Least P_R."""
+    manipulability: float
+    """Least P_M."""
+    gain: float
+    """Least P_M, as a multiple of the P_M of either member."""
+
+
+def check_rule(rule: str) -> None:
+    """Check that a rule exists.
+
+    Raises:
+        UnknownNameError: If the rule is not one of `RULES`.
+    """
+    if rule not in RULES:
+        raise UnknownNameError("rule", rule, RULES, where="sets")
+
+
+def candidates_of(
+    reached: NDArray[np.bool_], weights: NDArray[np.float64], rule: str
+) -> NDArray[np.int32]:
+    """Return the candidates: configurations kept as singles and in larger sets, shape (C,).
+
+    Args:
+        reached: Whether a goal is reached, shape (H, G).
+        weights: Weights of the goals, sum 1, shape (G,).
+        rule: One of `RULES`.
+    """
+    kept = reached.any(axis=1)
+    if rule == "code2015":
+        kept &= tc_reachability(reached, weights) >= CODE2015.least_single - FRACTION_TOLERANCE
+    return np.flatnonzero(kept).astype(np.int32)
+
+
+def pair_limits(
+    rule: str, reachability: NDArray[np.float64], manipulability: NDArray[np.float64]
+) -> PairLimits:
+    """Return the least scores of a kept pair, given the scores of the singles, shapes (C,)."""
+    if rule == "code2015":
+        if not reachability.size:
+            return PairLimits(0.0, 0.0, CODE2015.gain)
+        best = np.lexsort((-manipulability, -reachability))[0]
+        return PairLimits(
+            CODE2015.reachability * float(reachability[best]) - FRACTION_TOLERANCE,
+            CODE2015.manipulability * float(manipulability[best]),
+            CODE2015.gain,
+        )
+    # Greater than the maximum means at least the next greater number.
+    return PairLimits(0.0, float(np.nextafter(manipulability.max(initial=0.0), np.inf)), 0.0)
+
+
+def order_keys(
+    rule: str, reachability: NDArray[np.float64], manipulability: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the keys by which sets are ordered, first and second, greatest first."""
+    if rule == "code2015":
+        return reachability, manipulability
+    return reachability + manipulability, np.zeros_like(manipulability)
+
+
+def spaced_places(rule: str, xy: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the positions whose distances are compared with the least one, shape (N, 2) [m]."""
+    return np.round(xy, CODE2015.decimals) if rule == "code2015" else xy
+
 
 MOST_MEMBERS = 3
 """Greatest number of members of a set."""

@@ -9,7 +9,7 @@ from tcs.model.scene.spec import SceneSpec
 from tcs.placement.constraints import Obstacle
 from tcs.placement.constraints.blocking import blocked_bodies, blocked_solutions
 from tcs.placement.scoring import load_job, score
-from tcs.placement.scoring.robot_shapes import robot_shapes
+from tcs.placement.scoring.offline import robot_shapes
 from tcs.placement.selection import SelectionTables
 from tcs.placement.store.robot_shapes import RobotShapes
 from tests.environments import CORNER, write_environment

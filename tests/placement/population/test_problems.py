@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tcs.kernel.problem import build_problem
-from tcs.placement.population.problems import PersonProblems
+from tcs.placement.population.outcomes import PersonProblems
 from tcs.placement.scoring import load_job
 from tests.environments import CORNER, write_environment
 

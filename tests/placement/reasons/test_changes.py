@@ -3,7 +3,7 @@ import math
 import pytest
 
 from tcs.model.grid import InitialConfiguration
-from tcs.placement.reasons.changes import ahead_and_left, changes_between, sentence
+from tcs.placement.reasons.explained import ahead_and_left, changes_between, sentence
 
 
 def configuration(x=0.0, y=0.0, yaw_deg=0.0, torso=0.15, **environment):

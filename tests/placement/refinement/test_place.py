@@ -10,8 +10,8 @@ from tcs.errors import TaskError, TcsError
 from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.model.robots import load_robot
 from tcs.model.scene import EMPTY_ENVIRONMENT, Scene, SceneSpec
-from tcs.placement.refinement import base_poses, joint_path
-from tcs.placement.refinement.poses import PoseScene, PoseScorer
+from tcs.placement.refinement import base_poses
+from tcs.placement.refinement.base_poses import PoseScene, PoseScorer, joint_path
 
 
 def line(length, count=8):
@@ -78,7 +78,7 @@ def test_base_poses_far_from_each_other_are_tried_where_the_best_have_no_path(mo
         base = np.array([row.x[0], row.y[0]])
         tried.append(base)
         is_far = np.linalg.norm(base - tried[0]) > 0.25
-        return joint_path.joint_path(problem, row, through) if is_far else None
+        return joint_path(problem, row, through) if is_far else None
 
     monkeypatch.setattr(base_poses, "joint_path", blocked_near_the_best)
     found = tcs.place("iiwa7", line(0.3), region=((0.2, 0.9), (-0.6, 0.6)))

@@ -22,11 +22,15 @@ from tcs.placement.refinement import (
     refinement_summary,
     score_members,
 )
-from tcs.placement.refinement.displaced import ANGLE, RADIUS, DisplacedBases
-from tcs.placement.refinement.floor import SLACK, at_surest, settled
-from tcs.placement.refinement.objectives import ScoreObjective
-from tcs.placement.refinement.search import Evaluated, LocalSearch, Walk
-from tcs.placement.refinement.space import Space
+from tcs.placement.refinement.search import Evaluated, LocalSearch, ScoreObjective, Space, Walk
+from tcs.placement.refinement.success_under_error import (
+    ANGLE,
+    RADIUS,
+    SLACK,
+    DisplacedBases,
+    at_surest,
+    settled,
+)
 from tcs.placement.robustness import PerturbedPoints, Trials, success_summary
 from tcs.placement.store.encoding import decode, encode
 from tcs.placement.tables import Reason, RefinedSet, RefinedSuccess

@@ -9,11 +9,15 @@ import pytest
 
 import tcs
 from tcs.placement.refinement import PointScorer
-from tcs.placement.refinement.floor import RememberedSamples, successes
-from tcs.placement.refinement.search import Evaluated
-from tcs.placement.refinement.space import Space
-from tcs.placement.refinement.staged import StagedSamples, best_pairs
-from tcs.placement.refinement.surest import SurestSearch, surest_pairs, surest_triples
+from tcs.placement.refinement.search import Evaluated, Space
+from tcs.placement.refinement.success_under_error import RememberedSamples, successes
+from tcs.placement.refinement.surest import (
+    StagedSamples,
+    SurestSearch,
+    best_pairs,
+    surest_pairs,
+    surest_triples,
+)
 from tcs.placement.robustness import PerturbedPoints, Trials
 from tests.beside import BESIDE
 
@@ -81,7 +85,7 @@ def test_a_configuration_is_evaluated_once_in_each_part(made):
 
 @pytest.mark.parametrize("count", [1, 5, 100])
 def test_the_best_pairs_are_those_of_a_plain_loop(made, rng, monkeypatch, count):
-    monkeypatch.setattr("tcs.placement.refinement.staged.CHUNK", 4)
+    monkeypatch.setattr("tcs.placement.refinement.surest.CHUNK", 4)
     samples, weights = made
     staged = StagedSamples.of(samples, weights)
     features = staged.features(points(*range(9)), 3)

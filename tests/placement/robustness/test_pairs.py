@@ -9,8 +9,8 @@ import pytest
 from scipy import stats
 
 from tcs.errors import SelectionError, TcsError
-from tcs.placement.robustness import pairs as pairs_module
-from tcs.placement.robustness.pairs import Pairs, kept_pairs, uniform_sets
+from tcs.placement.robustness import kept_pairs as pairs_module
+from tcs.placement.robustness.kept_pairs import Pairs, kept_pairs, uniform_sets
 from tcs.placement.scoring.sets import build_sets
 from tests.placement.tables.small import random_scores, small_grid
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from tcs.placement.robustness.estimation import round_sizes, successive_halving
 from tcs.placement.robustness.statistics import intervals_of
-from tcs.placement.robustness.successive_halving import round_sizes, successive_halving
 from tcs.placement.tables import tc_reachability
 
 WEIGHTS = np.array([0.5, 0.25, 0.25])

@@ -10,7 +10,6 @@ from tcs.files.blocks import BlockFolder
 from tcs.files.paths import data_folder
 from tcs.model.robots import robot_names
 from tcs.placement.scoring import LiveScorer, load_job, score, summary
-from tcs.placement.scoring.approach_pass import approaches_key
 from tcs.placement.scoring.approaches import (
     ApproachScorer,
     approach_hindrance,
@@ -18,6 +17,7 @@ from tcs.placement.scoring.approaches import (
     choose_approach,
 )
 from tcs.placement.scoring.dry_run import estimate
+from tcs.placement.scoring.sweep import approaches_key
 from tcs.placement.tables import Reason
 from tests.environments import CORNER, write_environment
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tcs.placement.scoring.base_lattice import BORDER, lattice_of
+from tcs.placement.scoring.sets import BORDER, lattice_of
 from tcs.placement.tables import Reason, ScoreTable
 from tests.placement.tables.small import small_grid
 

@@ -12,8 +12,8 @@ from tcs.errors import OutputError, StoreFormatError
 from tcs.files import mapped
 from tcs.files.blocks import FORMAT, BlockFolder, load_block
 from tcs.files.compression import compress
+from tcs.placement.scoring.blocks import with_goals
 from tcs.placement.scoring.engines import Work
-from tcs.placement.scoring.shared_blocks import with_goals
 from tcs.placement.scoring.sweep import sweep
 
 # The package has a function of the module's name.

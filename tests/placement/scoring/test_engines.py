@@ -5,15 +5,16 @@ import pytest
 
 from tcs.errors import TcsError, UnknownNameError
 from tcs.kernel.problem import build_problem
+from tcs.placement.scoring import engines
 from tcs.placement.scoring.engines import (
     ENGINES,
     Dask,
+    PackedWork,
     Part,
     Threads,
     Work,
     engine_named,
 )
-from tcs.placement.scoring.engines.work import PackedWork
 from tcs.placement.scoring.scorer import Scorer
 from tcs.placement.scoring.sweep import sweep
 
@@ -80,9 +81,7 @@ def test_every_engine_gives_the_same_bytes(engine, lowered, small_job, excluded,
 
 
 def test_a_cluster_that_cannot_be_reached_is_told(monkeypatch, work):
-    from tcs.placement.scoring.engines import cluster
-
-    monkeypatch.setattr(cluster, "TIMEOUT", 0.5)
+    monkeypatch.setattr(engines, "TIMEOUT", 0.5)
     for address in ("tcp://127.0.0.1:9", "no address"):
         with pytest.raises(TcsError, match="cannot be reached"):
             list(Dask(address).scored(work, [Part(0, PART)]))
@@ -91,9 +90,7 @@ def test_a_cluster_that_cannot_be_reached_is_told(monkeypatch, work):
 def test_a_cluster_without_workers_is_told(monkeypatch, work):
     from distributed import LocalCluster
 
-    from tcs.placement.scoring.engines import cluster as module
-
-    monkeypatch.setattr(module, "TIMEOUT", 0.5)
+    monkeypatch.setattr(engines, "TIMEOUT", 0.5)
     with (
         LocalCluster(n_workers=0, processes=False, dashboard_address=":0") as empty,
         pytest.raises(TcsError, match="has no worker"),

@@ -10,12 +10,11 @@ import pytest
 from tcs.errors import TcsError
 from tcs.files.blocks import BlockFolder
 from tcs.placement.scoring import score
-from tcs.placement.scoring.kept_sets import kept_sets
-from tcs.placement.scoring.sets import build_sets, checked_options
+from tcs.placement.scoring.sets import build_sets, checked_options, kept_sets
 from tcs.stored import check_file
 from tests.placement.tables.small import random_scores, small_grid
 
-KEPT = importlib.import_module("tcs.placement.scoring.kept_sets")
+KEPT = importlib.import_module("tcs.placement.scoring.sets")
 OPTIONS = (
     {},
     {"rule": "code2015"},

@@ -11,7 +11,7 @@ from tcs.errors import StoreMismatchError, TcsError
 from tcs.files import mapped
 from tcs.model.grid import Grid
 from tcs.placement.scoring import build_sets, load_job, score, summary, verify
-from tcs.placement.scoring.strata import (
+from tcs.placement.scoring.file_checker import (
     SAMPLED,
     STRATA,
     estimated_recall,

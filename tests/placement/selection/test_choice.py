@@ -10,8 +10,7 @@ from hypothesis import assume, given, settings
 from tcs.errors import SelectionError, UnknownNameError
 from tcs.model.grid import Grid, InitialConfiguration
 from tcs.placement.constraints import Constraints
-from tcs.placement.scoring.base_lattice import lattice_of
-from tcs.placement.scoring.sets import build_sets
+from tcs.placement.scoring.sets import build_sets, lattice_of
 from tcs.placement.selection import (
     SelectionTables,
     TravelWeights,

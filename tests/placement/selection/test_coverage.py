@@ -7,7 +7,7 @@ from tcs.model.grid import InitialConfiguration
 from tcs.placement.scoring.sets import build_sets
 from tcs.placement.selection import SelectionTables, TravelWeights, UtilityWeights, select
 from tcs.placement.tables import BaseLattice
-from tcs.placement.tables.base_lattice import MOVES
+from tcs.placement.tables.sets import MOVES
 from tests.placement.tables.small import random_scores, small_grid
 
 GRID = small_grid(nx=5, ny=3, torsos=1)

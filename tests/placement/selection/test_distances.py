@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from tcs.errors import SelectionError
 from tcs.placement.selection.distances import LatticeDistances
 from tcs.placement.tables import BaseLattice
-from tcs.placement.tables.base_lattice import MOVES
+from tcs.placement.tables.sets import MOVES
 
 STEP = (0.1, 0.2)
 

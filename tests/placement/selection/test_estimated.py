@@ -10,7 +10,7 @@ import pytest
 
 from tcs.errors import SelectionError
 from tcs.model.grid import InitialConfiguration
-from tcs.placement.robustness.pairs import Pairs, kept_pairs
+from tcs.placement.robustness.kept_pairs import Pairs, kept_pairs
 from tcs.placement.selection import TravelWeights, UtilityWeights, select
 from tcs.placement.store import load_scores, save_scores
 from tcs.placement.tables import SuccessTable

@@ -23,8 +23,11 @@ from tcs.placement.selection import (
     scores_at_limbs,
     select,
 )
-from tcs.placement.selection.admission import admitted_candidates
-from tcs.placement.selection.limbs import admitted_at_limbs, tables_of_goals
+from tcs.placement.selection.admission import (
+    admitted_at_limbs,
+    admitted_candidates,
+    tables_of_goals,
+)
 from tcs.placement.selection.observed import nearest_table
 from tcs.placement.tables import ScoreTable
 from tests.placement.selection.test_admission import made_up_robot

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tcs.errors import TcsError
-from tcs.placement.tables.groups import Groups
+from tcs.placement.tables.sets import Groups
 
 
 def parts():

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tcs.errors import SelectionError, TcsError
 from tcs.model.random_streams import named_generator
 from tcs.placement.tables import SetTable
-from tcs.placement.tables.rules import FRACTION_TOLERANCE
+from tcs.placement.tables.sets import FRACTION_TOLERANCE
 
 IntArray = NDArray[np.int64]
 FloatArray = NDArray[np.float64]
