@@ -153,13 +153,9 @@ def score(
             "is for an environment that is not observed.", param_hint="--dry-run"
         )
     kept = options.block_folder(blocks, restart)
-    if blocks and (observed or frames):
-        raise typer.BadParameter("is not for an observed environment.", param_hint="--blocks")
-    if refine and (dry_run or observed or frames):
-        raise typer.BadParameter(
-            "is for scores of an environment that is not observed.", param_hint="--refine"
-        )
-    if engine != "threads" and (observed or frames or dry_run):
+    if refine and dry_run:
+        raise typer.BadParameter("requires scores, not --dry-run.", param_hint="--refine")
+    if engine != "threads" and dry_run:
         raise typer.BadParameter(
             "other than threads is for scoring a whole grid.", param_hint="--engine"
         )
@@ -175,7 +171,7 @@ def score(
     from tcs.placement.scoring import default_path, score_to_file
     from tcs.placement.scoring.engines import engine_named
 
-    offline: dict[str, Any] = {
+    work: dict[str, Any] = {
         "arms": arms,
         "blocks": kept,
         "engine": engine_named(engine, jobs=jobs, scheduler=scheduler),
@@ -202,7 +198,7 @@ def score(
             robot,
             out or Path(),
             progress=_progress,
-            **offline,
+            **work,
             **scoring_options,
         )
         _note_without_approach(rows)
@@ -224,43 +220,31 @@ def score(
         path = path.with_stem(f"{path.stem}-person")
     for problem in quick_problems(robot):
         terminal.note(f"warning, robot '{robot}': {problem} See: tcs robot check {robot}")
-    if not observed and not frames:
-        with _progress(task) as on_progress:
-            result = score_to_file.score_to_file(
-                task,
-                environment,
-                robot,
-                path,
-                on_progress=on_progress,
-                **offline,
-                **scoring_options,
-            )
-        _note_without_approach([result])
-        if refine:
-            result["refinement"] = refined_in_place(path, jobs)
-        result = _with_places(result)
-        terminal.print_result(result, tables.report_scores, as_json=as_json)
-        if refine and not as_json:
-            report_refined({**result["refinement"], "file": path})
-        return
-
     import tcs
     from tcs.cli.values import frame_values, observed_settings
     from tcs.model.scene import load_environment
 
-    if out is None:
-        # By default, do not overwrite the file of the task scored offline.
-        path = path.with_stem(f"{path.stem}-live")
-    observation = tcs.Observation(
-        joints=observed_settings(observed or (), load_environment(environment).observable_axes),
-        frames=frame_values(frames or ()),
-        setting=settings(at or (), "--at"),
-    )
-    result = score_to_file.score_observed_to_file(
-        task, environment, robot, path, observation, **scoring_options
-    )
+    if observed or frames:
+        if out is None:
+            # By default, do not overwrite the file of the task scored offline.
+            path = path.with_stem(f"{path.stem}-live")
+        work["observation"] = tcs.Observation(
+            joints=observed_settings(observed or (), load_environment(environment).observable_axes),
+            frames=frame_values(frames or ()),
+            setting=settings(at or (), "--at"),
+        )
+    with _progress(task) as on_progress:
+        result = score_to_file.score_to_file(
+            task, environment, robot, path, on_progress=on_progress, **work, **scoring_options
+        )
     _note_without_approach([result])
-    terminal.print_result(_with_places(result), tables.report_observed, as_json=as_json)
+    if refine:
+        result["refinement"] = refined_in_place(path, jobs)
+    result = _with_places(result)
+    report = tables.report_observed if observed or frames else tables.report_scores
+    terminal.print_result(result, report, as_json=as_json)
+    if refine and not as_json:
+        report_refined({**result["refinement"], "file": path})
 
 
 def _note_without_approach(results: Sequence[Mapping[str, Any]]) -> None:

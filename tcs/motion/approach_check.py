@@ -9,8 +9,9 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from tcs.errors import TcsError
+from tcs.kernel.approach.regions import approach_spline
 from tcs.kernel.approach.scene import LineScene, approach_scene
-from tcs.kernel.approach.sweep import ApproachLines, approach_spline
+from tcs.kernel.approach.sweep import ApproachLines
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.rows import rows_at
@@ -157,11 +158,11 @@ class ApproachScene:
     def _line_error(self, curve: Curve, goal: int) -> float:
         """Return the greatest error of the tool along the line to a goal [rad and m].
 
-        To a free goal the line ends where the tool is at the end of the curve.
+        To a goal that is a region the line ends where the tool is at the end of the curve.
         """
         scene, worst, task = self.scene, 0.0, self.job.task
         axis, end = self.problem.goals.turn, goal_poses(scene, task)[goal]
-        if task.goals[goal].free is not None:
+        if task.goals[goal].region:
             scene.set_arm(curve.q[-1])
             end = scene.tool_pose()
         X_GW, offset = end.inverse(), np.asarray(task.goals[goal].approach.offset)

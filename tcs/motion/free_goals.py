@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 
+from tcs.kernel.approach.sweep import ApproachLines
 from tcs.kernel.arrays import FloatArray, GridArrays, IntArray
 from tcs.kernel.motion.scene import goal_from_arm_base
 from tcs.kernel.postures import tool_poses
@@ -14,6 +16,7 @@ from tcs.kernel.problem import Problem
 from tcs.kernel.rows import rows_at
 from tcs.kernel.scores import REACHED
 from tcs.kernel.sweep import gripper_contacts, score
+from tcs.placement.scoring.approaches import ApproachScorer
 
 Pose = tuple[FloatArray, FloatArray]
 """Orientation, shape (3, 3), and position [m], shape (3,)."""
@@ -22,13 +25,17 @@ Pose = tuple[FloatArray, FloatArray]
 class FreeGoalPoses:
     """The pose at which each goal of a scene is reached from its initial configurations.
 
-    It is that of the most dexterous posture that scoring finds. Of a goal that is not reached, or
+    It is that of the most dexterous posture that scoring finds, of those that can be approached if
+    there are any. Of a goal that is not reached, or
     not free, it is the nominal pose, the first one of a goal that has several.
     """
 
-    def __init__(self, problem: Problem, grid: GridArrays, free: Sequence[bool]) -> None:
-        """Take a scene, its configurations, and whether each of its goals is free."""
+    def __init__(
+        self, problem: Problem, grid: GridArrays, free: Sequence[bool], lines: ApproachLines
+    ) -> None:
+        """Take a scene, its configurations, whether each goal is free, and their approaches."""
         self._problem, self._grid, self._free = problem, grid, free
+        self._approaches = ApproachScorer(problem, lines)
         self._known: dict[int, list[Pose]] = {}
 
     def at(self, configuration: int) -> list[Pose]:
@@ -49,7 +56,10 @@ class FreeGoalPoses:
         problem, row = self._problem, rows_at(self._grid, [configuration])
         goals = problem.goals.number
         scores = score(problem, row, self._grippers)
-        q = scores.joints[0].astype(np.float64)
+        led = copy.deepcopy(scores)
+        self._approaches.score_rows(problem, row, led)
+        is_led = (led.reason[0] == REACHED)[:, None]
+        q = np.where(is_led, led.joints[0], scores.joints[0]).astype(np.float64)
         R_AT, p_AT = np.empty((goals, 3, 3)), np.empty((goals, 3))
         tool_poses(problem.chain.R, problem.chain.p, q, R_AT, p_AT)
         poses = []

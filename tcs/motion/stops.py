@@ -34,6 +34,7 @@ from tcs.model.scene import LoweredScene, Scene, lower
 from tcs.motion.curves import CHAIN, in_chain
 from tcs.motion.free_goals import FreeGoalPoses
 from tcs.motion.keep_out import with_keep_out
+from tcs.placement.scoring.approaches import approach_lines
 from tcs.placement.scoring.job import Job
 
 BodyPair = tuple[str, str]
@@ -112,7 +113,8 @@ class StopGrid:
         poses = None
         if job.task.has_freedom:
             free = [bool(goal.region) for goal in job.task.goals]
-            poses = FreeGoalPoses(build_problem(lowered.arrays), lowered.grid, free)
+            problem = build_problem(lowered.arrays)
+            poses = FreeGoalPoses(problem, lowered.grid, free, approach_lines(job))
         if job.task.keep_out:
             lowered = with_keep_out(lowered, job.task)
         return cls(

@@ -81,13 +81,9 @@ def test_blocks_are_kept_and_taken(tcs_command, corner, corner_file, tmp_path):
         scored = ["0000000000.block", "0000000000.block", "sets.block"]
         assert sorted(block.name for block in kept) == scored
     assert tcs_command("check", *blocks.rglob("manifest.json"), *kept).code == 0
-    for words, told in [
-        (("--restart",), "requires --blocks"),
-        (("--blocks", blocks, "--observed", "person_x=0.01"), "not for an observed environment"),
-    ]:
-        ran = tcs_command("score", "shaving", *words)
-        assert ran.code == 2
-        assert told in " ".join(ran.err.replace("│", " ").split())
+    ran = tcs_command("score", "shaving", "--restart")
+    assert ran.code == 2
+    assert "requires --blocks" in " ".join(ran.err.replace("│", " ").split())
 
 
 def test_a_dry_run_estimates_and_writes_nothing(tcs_command, corner, corner_file, tmp_path):

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from tcs.errors import ArmClassError, RobotError
 from tcs.files.mapped import chunks
 from tcs.kernel.arrays import GridArrays
-from tcs.kernel.freedom.forms import FEWEST_JOINTS
 from tcs.kernel.problem import Problem
 from tcs.kernel.rows import Rows, no_rows, rows_at
 from tcs.kernel.scores import JOINTS, REACHED, Scores, new_scores
@@ -96,10 +95,6 @@ def approach_hindrance(job: Job) -> str:
             "approaches are scored for one arm, but goals of this task are reached by two at the "
             "same time"
         )
-    several = any(goal.alternatives for goal in job.task.goals)
-    joints = len(job.spec.robot.arm_joints)
-    if several or (job.task.has_freedom and joints > FEWEST_JOINTS):
-        return "approaches are scored for goals of a single pose, but goals of this task are free"
     try:
         job.spec.robot.arm_rates()
     except RobotError as error:
@@ -128,9 +123,9 @@ class ApproachScorer:
 
     def warm_up(self) -> None:
         """Compile the kernel or load its machine code."""
-        from tcs.kernel.approach.sweep import score_approaches
+        from tcs.kernel.approach.regions import warm_up
 
-        score_approaches(self.problem, self.lines, no_rows(), self._no_pairs(), self.memory())
+        warm_up(self.problem, self.lines, self.memory(), no_rows())
 
     def compiled_beside(self) -> AbstractContextManager[None]:
         """Have a second process compile what `warm_up` needs, if this one compiles within."""
@@ -168,7 +163,8 @@ class ApproachScorer:
         Returns:
             Arm joints of the pairs that remain reached [rad].
         """
-        from tcs.kernel.approach.sweep import ReachedPairs, score_approaches
+        from tcs.kernel.approach.regions import score_region_approaches
+        from tcs.kernel.approach.sweep import ReachedPairs
 
         found_pairs = (
             np.argwhere(reason[rows] == 0) + np.array([rows.start, 0]) for rows in chunks(reason)
@@ -185,7 +181,7 @@ class ApproachScorer:
                 contact[at].astype(np.int32), dexterity[at], joints[chosen].copy(),
             )  # fmt: skip
             at_rows = rows_at(grid, first + configurations)
-            score_approaches(self.problem, self.lines, at_rows, scores, self.memory())
+            score_region_approaches(self.problem, self.lines, at_rows, scores, self.memory())
             return scores
 
         found = Parallel(n_jobs=jobs, prefer="threads")(
@@ -206,13 +202,13 @@ class ApproachScorer:
             rows: The configurations.
             scores: Their scores, as `tcs.kernel.sweep.score` returns them.
         """
-        from tcs.kernel.approach.sweep import score_approaches
+        from tcs.kernel.approach.regions import score_region_approaches
 
         at = np.nonzero(scores.reason == REACHED)
         if not at[0].size:
             return
         pairs = _pairs_of(scores)
-        score_approaches(problem, self.lines, rows, pairs, self.memory())
+        score_region_approaches(problem, self.lines, rows, pairs, self.memory())
         scores.reason[at], scores.contact[at] = pairs.reason, pairs.contact
         scores.dexterity[at], scores.joints[at] = pairs.dexterity, pairs.joints
 

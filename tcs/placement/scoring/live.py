@@ -8,8 +8,9 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Unpack
+from typing import Any, Unpack
 
+from tcs.files.blocks import BlockFolder
 from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.kernel.problem import build_problem
 from tcs.model.grid import Axis, Grid, thinned
@@ -19,6 +20,7 @@ from tcs.model.scene import EnvironmentFile, Observation, estimate_joints
 from tcs.model.tasks import Task
 from tcs.placement.constraints import Constraints
 from tcs.placement.scoring.approaches import ApproachScorer, approach_lines
+from tcs.placement.scoring.engines import ScoringEngine
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.kernel_start import warm_up
 from tcs.placement.scoring.offline import (
@@ -103,6 +105,9 @@ class LiveScorer:
         *,
         every: int = 1,
         around: tuple[float, float] | None = None,
+        blocks: BlockFolder | None = None,
+        engine: ScoringEngine | None = None,
+        on_progress: Callable[[int, int], None] | None = None,
     ) -> ScoreFile:
         """Score the scene as it is observed.
 
@@ -110,6 +115,9 @@ class LiveScorer:
             observation: The observed environment; by default its nominal state.
             every: Score only every so many base positions along x and along y, for a first answer.
             around: x and y [m] of a base position whose nearest one of the grid is among those.
+            blocks: As for `tcs.score`; so are `engine` and `on_progress`.
+            engine: Who scores.
+            on_progress: Called with the number of scored configurations and their total.
 
         Returns:
             Scores and sets of the one observed state, for every function that takes a score file.
@@ -127,10 +135,18 @@ class LiveScorer:
             observation = Observation(joints=dict(observation or {}))
         grid = thinned(self.job.grid, every, around)
         with self._scene_in_use:
-            return self._score(observation, grid, begun)
+            setups, entry = self._observed(observation, grid, blocks=blocks, engine=engine)
+            return score_setups(
+                setups, begun=begun, metadata={"observation": entry}, on_progress=on_progress
+            )
 
-    def _score(self, observation: Observation, grid: Grid, begun: float) -> ScoreFile:
-        """Score the base poses of a grid in the scene as it is observed, as its only user."""
+    def _observed(
+        self, observation: Observation, grid: Grid, **work: Any
+    ) -> tuple[list[ScoringSetup], dict[str, Any]]:
+        """Return the setups for the base poses of a grid in the scene as it is observed.
+
+        Also the entry `observation` of the metadata. The caller is the only user of the scene.
+        """
         grid_axes = [axis.name for axis in self.job.grid.environment_axes]
         found = estimate_joints(self._setups[0].scene, observation, grid_axes)
         entry = {
@@ -141,11 +157,11 @@ class LiveScorer:
         }
         setups = [
             dataclasses.replace(
-                setup, job=dataclasses.replace(_job_at(setup, found.joints), grid=grid)
+                setup, job=dataclasses.replace(_job_at(setup, found.joints), grid=grid), **work
             )
             for setup in self._setups
         ]
-        return score_setups(setups, begun=begun, metadata={"observation": entry})
+        return setups, entry
 
 
 def _job_at(setup: ScoringSetup, joints: Mapping[str, float]) -> Job:

@@ -229,9 +229,8 @@ def score(
             that of the papers' average man. Goals on the person are moved to that body.
         approach: Whether a goal counts as reached only by postures that the arm can leave backwards
             along the goal's approach. The best of these gives joints and dexterity. By default
-            wherever approaches can be scored: goals of a single pose, or with an arm of five joints
-            free ones, that one arm reaches at a time, and known velocity limits. Elsewhere the file
-            records why not (`no_approach`).
+            wherever approaches can be scored: goals that one arm reaches at a time, and known
+            velocity limits. Elsewhere the file records why not (`no_approach`).
         blocks: Folder in which finished blocks of the grid are kept, so that the same call
             continues after the process was killed; see `tcs.placement.scoring.BlockFolder`.
         engine: Who scores: `Threads` or `Dask` of `tcs.placement.scoring.engines`; by

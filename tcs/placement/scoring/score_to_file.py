@@ -78,6 +78,7 @@ def score_to_file(
     robot: str,
     path: Path,
     *,
+    observation: Observation | None = None,
     on_progress: Callable[[int, int], None] | None = None,
     **options: Any,
 ) -> dict[str, Any]:
@@ -88,6 +89,7 @@ def score_to_file(
         environment: Name or path of an environment.
         robot: Name or path of a robot.
         path: File to write.
+        observation: Observed joint values or frames; None for the environment as it is described.
         on_progress: Called with the number of configurations done and in total.
         **options: Further options of `tcs.score`.
 
@@ -96,32 +98,14 @@ def score_to_file(
         TcsError: As `tcs.score`.
     """
     check_writable(path, (task, environment, robot))
-    file = score(task, environment, robot, on_progress=on_progress, **options)
+    if observation is None:
+        file = score(task, environment, robot, on_progress=on_progress, **options)
+    else:
+        work = {key: options.pop(key) for key in ("blocks", "engine") if key in options}
+        scorer = LiveScorer(task, environment, robot, **options)
+        file = scorer.score(observation, on_progress=on_progress, **work)
     save_scores(path, file)
     return saved_summary(path, file)
-
-
-def score_observed_to_file(
-    task: str, environment: str, robot: str, path: Path, observation: Observation, **options: Any
-) -> dict[str, Any]:
-    """Score a task in the observed scene, write its file and return the summary.
-
-    Args:
-        task: Name or path of a task.
-        environment: Name or path of an environment.
-        robot: Name or path of a robot.
-        path: File to write.
-        observation: Observed joint values or frames.
-        **options: Further options of `tcs.LiveScorer`.
-
-    Raises:
-        OutputError: If the file cannot be written or is an input; reported before scoring begins.
-        TcsError: As `tcs.LiveScorer`.
-    """
-    check_writable(path, (task, environment, robot))
-    file = LiveScorer(task, environment, robot, **options).score(observation)
-    save_scores(path, file)
-    return {**saved_summary(path, file), "observation": file.metadata["observation"]}
 
 
 def score_all_to_files(
@@ -216,4 +200,5 @@ def saved_summary(path: Path, file: ScoreFile) -> dict[str, Any]:
         **summary(file),
         "file": str(path),
         "file_bytes": path.stat().st_size,
+        **{key: file.metadata[key] for key in ("observation",) if key in file.metadata},
     }

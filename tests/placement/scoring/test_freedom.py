@@ -7,10 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from tcs.errors import ArmClassError
 from tcs.files.paths import data_folder
+from tcs.kernel.approach import regions
 from tcs.kernel.verification import free_scans
 from tcs.model.tasks import Freedom
+from tcs.motion import check_approaches
 from tcs.placement.scoring import load_job, score, verify
 from tcs.placement.scoring.drake_check import ROTATION_BAR, DrakeChecker
 from tcs.placement.tables import Reason
@@ -74,7 +75,19 @@ def test_the_file_says_what_is_free(file):
     assert file.task["goals"][0]["free"] == "any rotation about y"
 
 
-def test_approaches_refuse_free_goals_in_a_line(file, paths):
-    assert file.metadata["no_approach"].endswith("goals of this task are free")
-    with pytest.raises(ArmClassError, match="goals of this task are free"):
-        score(*paths, approach=True)
+def test_lines_lead_to_the_poses_that_are_held(file, paths):
+    assert "approach" in file.metadata
+    found = check_approaches(file, pairs=12)
+    assert (found.checked, found.false) == (12, 0)
+    without = score(*paths, approach=False)
+    before, after = (f.nominal.scores.reached for f in (without, file))
+    assert not np.any(after & ~before)
+    assert np.any(before & ~after)
+
+
+def test_other_poses_are_tried_where_no_line_leads_to_the_best(file, paths, monkeypatch):
+    monkeypatch.setattr(regions, "_try_other_poses", lambda *_: None)
+    first = score(*paths).nominal.scores.reached
+    reached = file.nominal.scores.reached
+    assert np.all(reached | ~first)
+    assert np.any(reached & ~first)
