@@ -65,7 +65,7 @@ class Given:
 def _is_of_its_scores(given: Given, chosen: dict[str, Any]) -> None:
     """Check that a selected set is in the file, with the scores that the file gives it."""
     assert chosen["reachability"] > 0.0
-    table, refined = given.file.nominal_index, chosen.get("refined_set")
+    table, refined = given.file.nominal_index, chosen.get("refined")
     if refined is not None:
         held = given.file.tables[table].refined
         assert held is not None

@@ -187,7 +187,7 @@ KINDS: dict[str, Kind] = {
     "two hands at once": Between(CLOSED),
     "two hands at once, free": Between(CLOSED, two_poses_of_the_first),
     "tool in the hand": Kind(CLOSED, exact, ("--tool", "razor")),
-    "tool in the hand, traced": Kind(TRACED, exact, ("--tool", "spoon")),
+    "tool in the hand, elimination": Kind(ELIMINATION, exact, ("--tool", "razor")),
     "observed scene": Kind(CLOSED, exact, ("--observed", "person_y=0.02")),
     "observed scene, free rotation": Kind(SIX, free(ROTATION), ("--observed", "person_y=0.02")),
     "observed scene, either hand, resumed": Kind(

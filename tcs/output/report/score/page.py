@@ -194,12 +194,7 @@ def _refined(report: ScoreReport) -> list[Section]:
     return [
         Section(
             "Between the grid points",
-            [
-                Text(
-                    f"Best set of the grid: {before}. Refined: {after}, from {stops}. No set "
-                    f"between the ends of the grid has P_R + P_M above {found['bound']:.4f}."
-                )
-            ],
+            [Text(f"Best set of the grid: {before}. Refined: {after}, from {stops}.")],
         )
     ]
 
