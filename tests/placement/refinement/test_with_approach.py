@@ -123,7 +123,7 @@ def test_the_base_is_where_it_is_at_the_torso_height(scored, monkeypatch):
     def noted(problem, lines, rows, pairs, memory):
         placed.append(memory.moved[rows.torso])
 
-    monkeypatch.setattr("tcs.kernel.approach.sweep.score_approaches", noted)
+    monkeypatch.setattr("tcs.kernel.approach.regions.score_approaches", noted)
     members = [int(h) for h in scored.nominal.sets.candidates[:6]]
     for member in members:
         trials.outcome(member, {name: np.zeros(1) for name in trials.errors.errors})
