@@ -232,7 +232,7 @@ SetCondition = Callable[[Sequence[FloatArray]], BoolArray]
 """Returns which of several sets satisfy a condition."""
 
 
-class Scorer(Protocol):
+class PointsScorer(Protocol):
     """Scores configurations anywhere."""
 
     @property
@@ -247,7 +247,7 @@ class Scorer(Protocol):
 class LocalSearch:
     """Refines sets together, so that a round prepares the scene once for all of them."""
 
-    scorer: Scorer
+    scorer: PointsScorer
     space: Space
     objective: ScoreObjective
     rng: np.random.Generator
