@@ -21,7 +21,14 @@ from tcs.kernel.arrays import (
 from tcs.kernel.collide import BOUND, CENTRE, pack
 from tcs.kernel.dexterity import DEFAULT_MEASURE, Dexterity, dexterity
 from tcs.kernel.distances import DistanceTables, arranged
-from tcs.kernel.freedom.goals import FreeGoals, axis_left_free, free_goals
+from tcs.kernel.freedom.forms import FEWEST_JOINTS
+from tcs.kernel.freedom.goals import (
+    FreeGoals,
+    axis_left_free,
+    free_goals,
+    free_turn,
+    no_freedom,
+)
 from tcs.kernel.groups import ShapeGroups, groups_of, with_boxes, with_group_rows
 from tcs.kernel.resting import resting_arm
 
@@ -185,6 +192,17 @@ class Problem(NamedTuple):
     def at_poses(self, R: FloatArray, p: FloatArray) -> Problem:
         """Return the problem with its goals at other poses in W, see `Goals.at`."""
         return self._replace(goals=self.goals.at(R, p))
+
+    def at_single_poses(self, R: FloatArray, p: FloatArray) -> Problem:
+        """Return the problem with goals of single poses in W, any number of them, see `Goals.at`.
+
+        An arm of five joints may rotate the tool about its free axis at each.
+        """
+        freedom = no_freedom()
+        if self.chain.joints == FEWEST_JOINTS:
+            freedom = free_turn(self.goals.turn, p.shape[1], self.goals.freedom.reach)
+        single = self.goals._replace(first_pose=np.empty(0, np.int64), freedom=freedom)
+        return self._replace(goals=single.at(R, p))
 
 
 def build_problem(scene: SceneArrays, measure: str = DEFAULT_MEASURE) -> Problem:

@@ -8,7 +8,6 @@ the region, which are scored as goals of a single pose.
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from tcs.kernel.approach import sweep
 from tcs.kernel.approach.memory import AnyApproach
@@ -16,8 +15,7 @@ from tcs.kernel.approach.scene import LineScene
 from tcs.kernel.approach.sweep import ApproachLines, ReachedPairs, score_approaches
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.contacts import NO_CONTACT
-from tcs.kernel.freedom.forms import AXIS, FEWEST_JOINTS
-from tcs.kernel.freedom.goals import no_freedom
+from tcs.kernel.freedom.forms import FEWEST_JOINTS, orientations
 from tcs.kernel.motion.scene import arm_base
 from tcs.kernel.postures import tool_poses
 from tcs.kernel.problem import Problem
@@ -61,7 +59,7 @@ def score_region_approaches(
 def warm_up(problem: Problem, lines: ApproachLines, memory: AnyApproach, none: Rows) -> None:
     """Compile what the two need, or load its machine code, given no rows."""
     if is_region(problem):
-        exact = _at_poses(problem, np.empty((1, 0, 3, 3)), np.empty((1, 0, 3)))
+        exact = problem.at_single_poses(np.empty((1, 0, 3, 3)), np.empty((1, 0, 3)))
         score(exact, none)
         _at_postures(problem, none, np.empty((0, JOINTS)))
     no_pairs = ReachedPairs(
@@ -105,7 +103,7 @@ def _try_other_poses(
         left = np.flatnonzero(pairs.reason[which] != REACHED)
         left = left[value[left, order[left, rank]] >= 0.0]
         if not left.size:
-            break
+            continue
         pose = order[left, rank]
         found = ReachedPairs(
             np.stack([left, pose], axis=1),
@@ -135,15 +133,13 @@ def _sampled(problem: Problem, goal: int) -> tuple[Problem, IntArray]:
     for pose in goals.poses_of(goal) if goals.freedom.first.size else ():
         R_WG, p_WG = goals.R[:, pose], goals.p[:, pose]
         form, u = goals.freedom.form[pose], goals.freedom.samples(pose)
-        tilt = Rotation.from_rotvec(u[:, 1:2] * form[9:12] + u[:, 2:3] * form[12:15])
-        about = Rotation.from_rotvec(u[:, :1] * form[AXIS : AXIS + 3])
-        R.append(R_WG[:, None] @ (tilt * about).as_matrix())
+        R.append(R_WG[:, None] @ orientations(form, u).as_matrix())
         p.append(p_WG[:, None] + np.einsum("sij,uj->sui", R_WG, u[:, 3:6]))
     every_R, every_p = np.concatenate(R, axis=1), np.concatenate(p, axis=1)
     others = np.linspace(count, every_p.shape[1], MOST_POSES, endpoint=False).astype(np.int64)
     nominal = np.arange(count)
     some = np.unique(np.concatenate([nominal, others[others < every_p.shape[1]]]))
-    return _at_poses(problem, every_R[:, some], every_p[:, some]), nominal
+    return problem.at_single_poses(every_R[:, some], every_p[:, some]), nominal
 
 
 def _at_postures(problem: Problem, rows: Rows, q: FloatArray) -> Problem:
@@ -154,13 +150,9 @@ def _at_postures(problem: Problem, rows: Rows, q: FloatArray) -> Problem:
         R_WA, p_WA = arm_base(problem, rows.at(slice(n, n + 1)))
         R[n], p[n] = R_WA @ R[n], p_WA + R_WA @ p[n]
     states = len(problem.goals.p)
-    return _at_poses(problem, np.repeat(R[None], states, axis=0), np.repeat(p[None], states, 0))
-
-
-def _at_poses(problem: Problem, R: FloatArray, p: FloatArray) -> Problem:
-    """Return a problem whose goals are single poses in W, for each environment state."""
-    single = problem.goals._replace(first_pose=np.empty(0, np.int64), freedom=no_freedom())
-    return problem._replace(goals=single.at(R, p))
+    return problem.at_single_poses(
+        np.repeat(R[None], states, axis=0), np.repeat(p[None], states, 0)
+    )
 
 
 def _lines_of(lines: ApproachLines, goals: IntArray) -> ApproachLines:

@@ -292,10 +292,10 @@ def _of_any_orientation(form: FloatArray) -> tuple[FloatArray, FloatArray, IntAr
     samples = ORIENTATIONS if form[ROTATES] else DIRECTIONS
     u = _orientations_spread(form, 1 + (1 + FURTHER) * (samples - 1))
     here, more = u[:samples], u[samples:]
-    quaternions = _orientations(form, here).as_quat()
+    quaternions = orientations(form, here).as_quat()
     # A rotation is a unit quaternion or its negative.
     tree = cKDTree(np.concatenate([quaternions, -quaternions]))
-    near = tree.query(_orientations(form, more).as_quat(), k=2)[1] % samples
+    near = tree.query(orientations(form, more).as_quat(), k=2)[1] % samples
     displaced = [here]
     for n, one in enumerate(here):
         moved = _displacements(form, n, float(n > 0))[1:]
@@ -324,11 +324,11 @@ def wrist_positions(form: FloatArray, u: FloatArray, wrist: FloatArray) -> Float
         u: Parameters, shape (n, PARAMETERS).
         wrist: The point in T [m], shape (3,).
     """
-    return np.array(u[:, 3:6] + _orientations(form, u).apply(wrist))
+    return np.array(u[:, 3:6] + orientations(form, u).apply(wrist))
 
 
-def _orientations(form: FloatArray, u: FloatArray) -> Rotation:
-    """Return the orientations R_GT of poses."""
+def orientations(form: FloatArray, u: FloatArray) -> Rotation:
+    """Return the orientations R_GT of poses; the arguments are those of `wrist_positions`."""
     tilt = Rotation.from_rotvec(u[:, 1:2] * form[9:12] + u[:, 2:3] * form[12:15])
     return tilt * Rotation.from_rotvec(u[:, :1] * form[AXIS : AXIS + 3])
 

@@ -116,6 +116,34 @@ def no_freedom() -> FreeGoals:
     )
 
 
+def free_turn(axis: FloatArray, count: int, reach: WristReach) -> FreeGoals:
+    """Return the freedom of single poses at which an arm of five joints finds the angle.
+
+    Args:
+        axis: Axis in T about which the tool may rotate, shape (3,).
+        count: Number of poses.
+        reach: Where the wrist has to be.
+    """
+    form = np.zeros((count, COLUMNS + 6))
+    form[:, AXIS : AXIS + 3], form[:, FOLD] = axis, 1.0
+    return no_freedom()._replace(
+        form=form,
+        turned=np.zeros(count, np.bool_),
+        step=np.zeros((count, PARAMETERS)),
+        fallback=np.full(count, -1),
+        first=np.arange(count + 1),
+        codes=np.arange(count + 1),
+        start=np.zeros(count, np.int64),
+        parents=np.zeros((1, 2), np.int64),
+        child_first=np.zeros(2, np.int64),
+        u=np.zeros((1, PARAMETERS)),
+        wrist=np.zeros((1, 3)),
+        is_tried=np.ones(1, np.bool_),
+        around=np.zeros((count, 4)),
+        reach=reach,
+    )
+
+
 def free_goals(rows: FloatArray, chain: Chain, measure: Dexterity | None = None) -> FreeGoals:
     """Return the freedom of the poses of goals, with the tool poses to try.
 

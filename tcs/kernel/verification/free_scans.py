@@ -13,15 +13,12 @@ from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.five_joints.turned import turned_chain
 from tcs.kernel.freedom.forms import (
     AXIS,
-    COLUMNS,
     FEWEST_JOINTS,
     FOLD,
     HALF,
-    PARAMETERS,
     ROTATES,
     TILT,
 )
-from tcs.kernel.freedom.goals import FreeGoals, no_freedom
 from tcs.kernel.problem import Problem, chain_of
 from tcs.kernel.rows import Rows
 from tcs.kernel.scores import REACHED
@@ -77,8 +74,6 @@ def drawn_poses(form: FloatArray, seed: int = 0) -> tuple[FloatArray, FloatArray
 def at_poses(problem: Problem, state: int, goal: int) -> Problem:
     """Return a problem whose goals are the drawn poses of one goal, alike in every state.
 
-    They are single poses; an arm of five joints may rotate the tool about the axis at each.
-
     Args:
         problem: The problem.
         state: The environment state from which the goal is taken.
@@ -93,35 +88,8 @@ def at_poses(problem: Problem, state: int, goal: int) -> Problem:
         drawn.append((R_WG @ R_GT, p_WG + p_GT @ R_WG.T))
     R, p = (np.concatenate(parts) for parts in zip(*drawn, strict=True))
     states = len(problem.goals.R)
-    is_turned = problem.chain.joints == FEWEST_JOINTS
-    goals = problem.goals.at(np.repeat(R[None], states, axis=0), np.repeat(p[None], states, axis=0))
-    return problem._replace(
-        goals=goals._replace(
-            first_pose=np.empty(0, np.int64),
-            freedom=_turning(problem, len(R)) if is_turned else no_freedom(),
-        )
-    )
-
-
-def _turning(problem: Problem, count: int) -> FreeGoals:
-    """Return the freedom of goals at which an arm of five joints finds the angle about the axis."""
-    form = np.zeros((count, COLUMNS + 6))
-    form[:, AXIS : AXIS + 3], form[:, FOLD] = problem.goals.turn, 1.0
-    return no_freedom()._replace(
-        form=form,
-        turned=np.zeros(count, np.bool_),
-        step=np.zeros((count, PARAMETERS)),
-        fallback=np.full(count, -1),
-        first=np.arange(count + 1),
-        codes=np.arange(count + 1),
-        start=np.zeros(count, np.int64),
-        parents=np.zeros((1, 2), np.int64),
-        child_first=np.zeros(2, np.int64),
-        u=np.zeros((1, PARAMETERS)),
-        wrist=np.zeros((1, 3)),
-        is_tried=np.ones(1, np.bool_),
-        around=np.zeros((count, 4)),
-        reach=problem.goals.freedom.reach,
+    return problem.at_single_poses(
+        np.repeat(R[None], states, axis=0), np.repeat(p[None], states, axis=0)
     )
 
 

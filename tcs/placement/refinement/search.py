@@ -232,7 +232,7 @@ SetCondition = Callable[[Sequence[FloatArray]], BoolArray]
 """Returns which of several sets satisfy a condition."""
 
 
-class PointsScorer(Protocol):
+class ScoresPoints(Protocol):
     """Scores configurations anywhere."""
 
     @property
@@ -247,7 +247,7 @@ class PointsScorer(Protocol):
 class LocalSearch:
     """Refines sets together, so that a round prepares the scene once for all of them."""
 
-    scorer: PointsScorer
+    scorer: ScoresPoints
     space: Space
     objective: ScoreObjective
     rng: np.random.Generator

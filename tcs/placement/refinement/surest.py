@@ -17,9 +17,9 @@ from tcs.placement.refinement.search import (
     Evaluated,
     Features,
     LocalSearch,
-    PointsScorer,
     Samples,
     ScoreObjective,
+    ScoresPoints,
     Space,
     Walk,
 )
@@ -237,7 +237,7 @@ class SurestSearch(LocalSearch):
 
     @classmethod
     def of(
-        cls, scorer: PointsScorer, space: Space, staged: StagedSamples, rng: np.random.Generator
+        cls, scorer: ScoresPoints, space: Space, staged: StagedSamples, rng: np.random.Generator
     ) -> Self:
         """Return a search for the greatest success; P_R + P_M decides among equals."""
         objective = ScoreObjective(staged.weights)

@@ -20,8 +20,8 @@ BATCH = 64
 class Scorer(NamedTuple):
     """A scene in some states, with one hand and its goals.
 
-    Whoever scores makes rows: the offline grid, perturbed rooms and bodies of a population (a state
-    for each), refinement, and base poses for poses of the tool.
+    Rows come from the offline grid, perturbed rooms and bodies of a population (a state for each),
+    refinement, and base poses for poses of the tool.
     """
 
     problem: Problem
