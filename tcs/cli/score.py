@@ -148,10 +148,6 @@ def score(
         raise typer.BadParameter("give a task, or --all for all tasks.", param_hint="TASK")
     if task is None and (observed or frames):
         raise typer.BadParameter("requires one task, not --all.", param_hint="--observed")
-    if dry_run and (observed or frames):
-        raise typer.BadParameter(
-            "is for an environment that is not observed.", param_hint="--dry-run"
-        )
     kept = options.block_folder(blocks, restart)
     if refine and dry_run:
         raise typer.BadParameter("requires scores, not --dry-run.", param_hint="--refine")
@@ -166,8 +162,10 @@ def score(
             param_hint="--at",
         )
 
-    from tcs.cli.values import person_values, settings
+    import tcs
+    from tcs.cli.values import frame_values, observed_settings, person_values, settings
     from tcs.model.robot_check import quick_problems
+    from tcs.model.scene import load_environment
     from tcs.placement.scoring import default_path, score_to_file
     from tcs.placement.scoring.engines import engine_named
 
@@ -188,8 +186,19 @@ def score(
         "jobs": jobs,
         "on_compile": terminal.note_compiling,
     }
+    observation = None
+    if observed or frames:
+        observation = tcs.Observation(
+            joints=observed_settings(
+                observed or (), load_environment(environment or "wheelchair").observable_axes
+            ),
+            frames=frame_values(frames or ()),
+            setting=settings(at or (), "--at"),
+        )
     if dry_run:
-        rows = score_to_file.estimate_all(task, environment, robot, arms=arms, **scoring_options)
+        rows = score_to_file.estimate_all(
+            task, environment, robot, observation=observation, arms=arms, **scoring_options
+        )
         terminal.print_result({"rows": rows}, tables.report_estimates, as_json=as_json)
         return
     if task is None:
@@ -220,28 +229,19 @@ def score(
         path = path.with_stem(f"{path.stem}-person")
     for problem in quick_problems(robot):
         terminal.note(f"warning, robot '{robot}': {problem} See: tcs robot check {robot}")
-    import tcs
-    from tcs.cli.values import frame_values, observed_settings
-    from tcs.model.scene import load_environment
-
-    if observed or frames:
-        if out is None:
-            # By default, do not overwrite the file of the task scored offline.
-            path = path.with_stem(f"{path.stem}-live")
-        work["observation"] = tcs.Observation(
-            joints=observed_settings(observed or (), load_environment(environment).observable_axes),
-            frames=frame_values(frames or ()),
-            setting=settings(at or (), "--at"),
-        )
+    if observation is not None and out is None:
+        # By default, do not overwrite the file of the task scored offline.
+        path = path.with_stem(f"{path.stem}-live")
     with _progress(task) as on_progress:
         result = score_to_file.score_to_file(
-            task, environment, robot, path, on_progress=on_progress, **work, **scoring_options
-        )
+            task, environment, robot, path, observation=observation, on_progress=on_progress,
+            **work, **scoring_options,
+        )  # fmt: skip
     _note_without_approach([result])
     if refine:
         result["refinement"] = refined_in_place(path, jobs)
     result = _with_places(result)
-    report = tables.report_observed if observed or frames else tables.report_scores
+    report = tables.report_observed if observation is not None else tables.report_scores
     terminal.print_result(result, report, as_json=as_json)
     if refine and not as_json:
         report_refined({**result["refinement"], "file": path})

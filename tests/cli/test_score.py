@@ -101,7 +101,14 @@ def test_a_dry_run_estimates_and_writes_nothing(tcs_command, corner, corner_file
     ran = tcs_command(*words)
     assert (ran.code, "36" in ran.out) == (0, True)
     assert not path.exists()
-    assert tcs_command(*words, "--observed", "person_x=0.01").code == 2
+    # Of a person who is seen elsewhere, other goals are reached.
+    seen = ("score", "shaving", "--environment", corner, "--observed", "person_x=0.06")
+    (row,) = tcs_command(*seen, "--dry-run", "--json").json["rows"]
+    assert tcs_command(*seen, "--out", path).code == 0
+    scored = tcs.load(path).nominal.scores
+    assert len(scored.arm_joints) != len(scores.arm_joints)
+    arrays = (scored.reason, scored.reached, scored.pair, scored.dexterity, scored.arm_joints)
+    assert row["memory_bytes"] == sum(array.nbytes for array in arrays)
 
 
 def test_constraints_when_scoring(tcs_command, corner, tmp_path):

@@ -12,11 +12,12 @@ import numpy as np
 from tcs.files.compression import compress
 from tcs.files.mapped import LEAST_BYTES
 from tcs.kernel.problem import build_problem
-from tcs.placement.scoring.approaches import ApproachScorer, approach_lines, choose_approach
+from tcs.placement.scoring.approaches import ApproachScorer, approach_lines
 from tcs.placement.scoring.blocks import BLOCK, Block
 from tcs.placement.scoring.engines import SLICE, Part, Work
 from tcs.placement.scoring.job import Job, whole_task
 from tcs.placement.scoring.kernel_start import warm_up
+from tcs.placement.scoring.offline import ScoringSetup
 from tcs.placement.scoring.scorer import Scorer
 
 SAMPLES = 24
@@ -55,33 +56,21 @@ class Estimate:
         return asdict(self)
 
 
-def estimate(
-    hands: Sequence[Job],
-    *,
-    measure: str,
-    jobs: int,
-    approach: bool | None = None,
-    slices: int = SAMPLES,
-) -> Estimate:
+def estimate(setups: Sequence[ScoringSetup], *, slices: int = SAMPLES) -> Estimate:
     """Estimate what scoring the jobs of some hands into one file would take.
 
     Args:
-        hands: The job of each hand.
-        measure: Name of the dexterity measure.
-        jobs: Number of threads; the time is that of one thread divided by it.
-        approach: As for `tcs.score`.
+        setups: The job of each hand, with its scene; the time is that of one thread divided by
+            their number of threads. Forbidden regions are not subtracted.
         slices: Greatest number of slices to score.
-
-    Raises:
-        ArmClassError: If `approach` is requested where it cannot be scored.
     """
-    built = [(job, job.scene()) for job in hands]
-    choice = choose_approach(approach, hands)
     found = []
-    for job, scene in built:
-        lowered = job.lowered(scene)
-        problem = build_problem(lowered.arrays, measure)
-        scorer = ApproachScorer(problem, approach_lines(job)) if choice.is_scored else None
+    for setup in setups:
+        job = setup.job
+        lowered = job.lowered(setup.scene)
+        problem = build_problem(lowered.arrays, setup.measure)
+        is_scored = setup.approach.is_scored
+        scorer = ApproachScorer(problem, approach_lines(job)) if is_scored else None
         warm_up(problem, approaches=scorer)
         work = Work(Scorer.of(problem), lowered.grid)
         size = job.scored_grid.size
@@ -90,12 +79,12 @@ def estimate(
             scored_slice(work, Part(start, min(start + SLICE, size)), scorer)
             for start in starts.tolist()
         ]
-        found.append(estimate_from(job, scored, jobs=jobs))
+        found.append(estimate_from(job, scored, jobs=setup.jobs))
     sums = ("scoring_seconds", "memory_bytes", "scratch_bytes", "disk_bytes", "blocks")
     return replace(
         found[0],
-        robot=hands[0].given_robot.name,
-        goals=len(whole_task(hands).goals),
+        robot=setups[0].job.given_robot.name,
+        goals=len(whole_task([setup.job for setup in setups]).goals),
         scoring_seconds_error=float(np.hypot.reduce([one.scoring_seconds_error for one in found])),
         **{name: sum(getattr(one, name) for one in found) for name in sums},
     )

@@ -20,6 +20,7 @@ from tcs.model.scene import EnvironmentFile, Observation, estimate_joints
 from tcs.model.tasks import Task
 from tcs.placement.constraints import Constraints
 from tcs.placement.scoring.approaches import ApproachScorer, approach_lines
+from tcs.placement.scoring.dry_run import Estimate, estimate
 from tcs.placement.scoring.engines import ScoringEngine
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.kernel_start import warm_up
@@ -131,8 +132,6 @@ class LiveScorer:
             TcsError: If a joint follows another joint, or a value is beyond its limits.
         """
         begun = time.perf_counter()
-        if not isinstance(observation, Observation):
-            observation = Observation(joints=dict(observation or {}))
         grid = thinned(self.job.grid, every, around)
         with self._scene_in_use:
             setups, entry = self._observed(observation, grid, blocks=blocks, engine=engine)
@@ -140,13 +139,27 @@ class LiveScorer:
                 setups, begun=begun, metadata={"observation": entry}, on_progress=on_progress
             )
 
+    def estimate(self, observation: ObservationLike | None = None) -> Estimate:
+        """Estimate what scoring the scene as it is observed would take.
+
+        Args:
+            observation: As for `score`.
+
+        Raises:
+            TcsError: The errors of `score`.
+        """
+        with self._scene_in_use:
+            return estimate(self._observed(observation, self.job.grid)[0])
+
     def _observed(
-        self, observation: Observation, grid: Grid, **work: Any
+        self, observation: ObservationLike | None, grid: Grid, **work: Any
     ) -> tuple[list[ScoringSetup], dict[str, Any]]:
         """Return the setups for the base poses of a grid in the scene as it is observed.
 
         Also the entry `observation` of the metadata. The caller is the only user of the scene.
         """
+        if not isinstance(observation, Observation):
+            observation = Observation(joints=dict(observation or {}))
         grid_axes = [axis.name for axis in self.job.grid.environment_axes]
         found = estimate_joints(self._setups[0].scene, observation, grid_axes)
         entry = {

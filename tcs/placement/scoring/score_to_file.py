@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
 from tcs.errors import TaskError
 from tcs.files.writing import check_writable, make_folder
-from tcs.model.people import PersonLike
 from tcs.model.scene import Observation, environment_names, load_environment
 from tcs.model.tasks import load_task, task_names
-from tcs.placement.constraints import Constraints
 from tcs.placement.scoring.dry_run import estimate
-from tcs.placement.scoring.job import load_jobs
 from tcs.placement.scoring.live import LiveScorer
-from tcs.placement.scoring.offline import score
+from tcs.placement.scoring.offline import load_setups, score
 from tcs.placement.scoring.score_summary import summary
+from tcs.placement.scoring.sets import SetOptions
 from tcs.placement.store import ScoreFile, save_scores
 
 
@@ -150,14 +148,11 @@ def estimate_all(
     environment: str | None,
     robot: str,
     *,
+    observation: Observation | None = None,
     measure: str,
     jobs: int,
-    constraints: Constraints,
-    now: Mapping[str, float],
-    person: PersonLike | None,
-    approach: bool | None = None,
-    arms: str | None = None,
-    **_others: Any,
+    on_compile: Callable[[], None] | None = None,
+    **options: Any,
 ) -> list[dict[str, Any]]:
     """Estimate what scoring would take, for one task or, as `score_all_to_files`, for all.
 
@@ -165,14 +160,11 @@ def estimate_all(
         task: Name or path of a task; None for all.
         environment: Name or path of an environment; None for the default or for all.
         robot: Name or path of a robot.
+        observation: Observed joint values or frames; None for the environment as it is described.
         measure: Name of the dexterity measure.
         jobs: Number of threads.
-        constraints: As for `tcs.score`; forbidden regions are not subtracted.
-        now: As for `tcs.score`.
-        person: As for `tcs.score`.
-        approach: As for `tcs.score`.
-        arms: As for `tcs.score`.
-        **_others: Options of `tcs.score` that change nothing in the estimate.
+        on_compile: Called before the kernel compiles, if it has to.
+        **options: Further options of `tcs.score`; forbidden regions are not subtracted.
 
     Raises:
         TcsError: As `tcs.score`.
@@ -182,14 +174,21 @@ def estimate_all(
         if task is None
         else ((task, environment or "wheelchair"),)
     )
-    jobs_of = (
-        load_jobs(name, where, robot, constraints=constraints, now=now, person=person, arms=arms)
-        for name, where in pairs
-    )
-    return [
-        estimate(hands, measure=measure, jobs=jobs, approach=approach).to_json()
-        for hands in jobs_of
-    ]
+    sets: Any = {key: options.pop(key) for key in SetOptions.__annotations__ if key in options}
+    found = []
+    for name, where in pairs:
+        if observation is None:
+            setups = load_setups(
+                name, where, robot, measure=measure, jobs=jobs, sets=sets, **options
+            )
+            found.append(estimate(setups))
+        else:
+            scorer = LiveScorer(
+                name, where, robot, measure=measure, jobs=jobs, on_compile=on_compile, **sets,
+                **options,
+            )  # fmt: skip
+            found.append(scorer.estimate(observation))
+    return [one.to_json() for one in found]
 
 
 def saved_summary(path: Path, file: ScoreFile) -> dict[str, Any]:

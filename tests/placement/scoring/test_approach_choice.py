@@ -17,6 +17,7 @@ from tcs.placement.scoring.approaches import (
     choose_approach,
 )
 from tcs.placement.scoring.dry_run import estimate
+from tcs.placement.scoring.offline import load_setups
 from tcs.placement.scoring.sweep import approaches_key
 from tcs.placement.tables import Reason
 from tests.environments import CORNER, write_environment
@@ -89,9 +90,12 @@ def test_unknown_velocity_limits_are_named(slow_iiwa, corner):
 
 
 def test_a_dry_run_scores_approaches_too(by_default, corner):
-    job = load_job("shaving", corner, "pr2")
     sizes = [
-        estimate([job], measure="isotropy", jobs=1, approach=approach).memory_bytes
+        estimate(
+            load_setups(
+                "shaving", corner, "pr2", measure="isotropy", jobs=1, sets={}, approach=approach
+            )
+        ).memory_bytes
         for approach in (None, False)
     ]
     postures = summary(by_default)["approach"]
