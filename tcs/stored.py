@@ -55,7 +55,7 @@ def check_file(path: str | os.PathLike[str]) -> StoredFile:
     Args:
         path: A score file, motion file, capability map, ARPlace model, probability map, block of
             `--blocks`, or `manifest.json` beside blocks (which are then all read), plan (`.json`)
-            or run of the teleoperated arm (`.csv`, `.parquet`).
+            or run of the teleoperated arm (`.csv`).
 
     Raises:
         StoreError: If the file cannot be read.
@@ -121,5 +121,4 @@ _JOBLIB_FILES: Mapping[str, _Loader] = {
 _TEXT_FILES: Mapping[str, _Loader] = {
     ".json": ("plan", _load_plan),
     ".csv": ("run of a teleoperated arm", _load_run),
-    ".parquet": ("run of a teleoperated arm", _load_run),
 }

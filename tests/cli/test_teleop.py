@@ -8,15 +8,11 @@ from pathlib import Path
 import pytest
 
 
-def test_unknown_robots_and_formats_are_refused_in_a_line(tcs_command, tmp_path):
+def test_unknown_robots_are_refused_in_a_line(tcs_command, tmp_path):
     ran = tcs_command("teleop", "experiment", "--robot", "iwa7", "--out", tmp_path / "out")
     assert ran.code == 1
     assert "Did you mean 'iiwa7'?" in ran.err
     assert list(tmp_path.iterdir()) == []
-    ran = tcs_command("teleop", "experiment", "--runs", "--runs-as", "xlsx", "--out", tmp_path)
-    assert ran.code == 1
-    assert ".csv or .parquet" in ran.err
-    assert len(ran.err.strip().splitlines()) == 1
 
 
 def test_maps_of_a_robot_without_a_head_are_refused_before_the_work(tcs_command, tmp_path):

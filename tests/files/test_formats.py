@@ -73,7 +73,6 @@ FORMATS = {
     ),
     # CSV keeps ten digits.
     "run as CSV": Format(".csv", run, save_run, load_run, DataFileError, False, 1e-9),
-    "run as Parquet": Format(".parquet", run, save_run, load_run, DataFileError, False),
 }
 JOBLIB = {name: file_format for name, file_format in FORMATS.items() if file_format.is_joblib}
 over_formats = pytest.mark.parametrize("kept", FORMATS.values(), ids=FORMATS.keys())

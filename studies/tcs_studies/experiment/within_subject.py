@@ -19,7 +19,7 @@ from tcs.kernel.arrays import FloatArray
 from tcs.teleop.arm import Arm
 from tcs.teleop.control.latency import NO_LATENCY, Latency
 from tcs.teleop.line import Course
-from tcs.teleop.runs.files import FORMATS, save_run
+from tcs.teleop.runs.files import SUFFIX, save_run
 from tcs.teleop.runs.run import Run
 from tcs_studies.experiment.comparison import Comparison
 from tcs_studies.experiment.order import counterbalanced_orders
@@ -184,7 +184,6 @@ def run_experiment(
     plan: ExperimentPlan | None = None,
     *,
     runs: Path | None = None,
-    runs_as: str = ".csv",
     jobs: int = 1,
     on_progress: OnProgress | None = None,
 ) -> Experiment:
@@ -195,7 +194,6 @@ def run_experiment(
         course: The line and the start posture.
         plan: Size and seed of the experiment; None for those of the paper.
         runs: Existing folder to save each counted trial to; None saves none.
-        runs_as: Format of these files, ".csv" or ".parquet".
         jobs: Number of processes; the results do not depend on it.
         on_progress: Called with the number of pairs (operator, condition) done and of all.
 
@@ -204,8 +202,6 @@ def run_experiment(
         OutputError: If a run cannot be saved.
     """
     plan = plan or ExperimentPlan()
-    if runs_as not in FORMATS:
-        raise TcsError(f"runs as '{runs_as}': must be {' or '.join(FORMATS)}.")
     traits = tuple(
         OperatorTraits.drawn(_rng(plan.seed, operator)) for operator in range(plan.operators)
     )
@@ -215,7 +211,7 @@ def run_experiment(
         for condition in plan.order(operator)
     ]
     calls = (
-        delayed(_drive)(arm, course, plan, operator, condition, traits[operator], runs, runs_as)
+        delayed(_drive)(arm, course, plan, operator, condition, traits[operator], runs)
         for operator, condition in work
     )
     found: list[ControllerTrials] = []
@@ -239,7 +235,6 @@ def _drive(
     condition: Condition,
     traits: OperatorTraits,
     runs: Path | None,
-    runs_as: str,
 ) -> ControllerTrials:
     """Return the trials of one operator with one controller."""
     habits = Experience()
@@ -265,7 +260,7 @@ def _drive(
             work.append(work_over_time(run, course.line))
             postures.append(run.joints[:: max(1, round(0.1 / run.step))].copy())
             if runs is not None:
-                save_run(runs / run_name(run, runs_as), run)
+                save_run(runs / run_name(run), run)
     return ControllerTrials(
         operator,
         condition.name,
@@ -277,11 +272,11 @@ def _drive(
     )
 
 
-def run_name(run: Run, runs_as: str = ".csv") -> str:
+def run_name(run: Run) -> str:
     """Return the name of a trial's file, e.g. "novel-operator-03-trial-1.csv"."""
     metadata = run.metadata
     operator, trial = metadata["operator"], metadata["trial"]
-    return f"{metadata['condition']}-operator-{operator:02d}-trial-{trial}{runs_as}"
+    return f"{metadata['condition']}-operator-{operator:02d}-trial-{trial}{SUFFIX}"
 
 
 def _rng(seed: int, *place: int) -> np.random.Generator:

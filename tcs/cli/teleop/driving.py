@@ -76,7 +76,7 @@ def live(
     ] = False,
     save: Annotated[
         Path | None,
-        typer.Option(metavar="RUN", help="Write the run at the end: .csv or .parquet."),
+        typer.Option(metavar="RUN", help="Write the run at the end, a .csv."),
     ] = None,
     cameras: Annotated[
         bool,
@@ -108,10 +108,10 @@ def live(
 
     from tcs.files.writing import check_writable
     from tcs.output.view.teleop.session import LiveOptions, LiveSession
-    from tcs.teleop.runs.files import check_format, save_run
+    from tcs.teleop.runs.files import check_suffix, save_run
 
     if save is not None:
-        check_format(save)
+        check_suffix(save)
         check_writable(save)
     course = None
     if line:

@@ -42,9 +42,6 @@ def experiment(
     runs: Annotated[
         bool, typer.Option("--runs", help="Also save the run of each evaluated trial.")
     ] = False,
-    runs_as: Annotated[
-        str, typer.Option(help="Format of the runs: csv, or parquet (extra `parquet` of tcs).")
-    ] = "csv",
     maps: Annotated[
         bool, typer.Option("--maps", help="Also write a capability map of each controller.")
     ] = False,
@@ -75,18 +72,17 @@ def experiment(
     if latency.seconds:
         words += ["--latency", f"{latency.seconds:g}", "--latency-of", latency.path]
     folder = out or Path(f"teleop-{Path(robot).stem}")
-    suffix = f".{runs_as.removeprefix('.')}" if runs else None
     plan = ExperimentPlan(
         operators=operators, trials=trials, training=training, seed=seed, latency=latency
     )
     file = load_robot(robot)
     arm = load_arm(file, torso_height=torso_height_of(file, torso_height))
-    make_experiment_folder(arm, folder, runs_as=suffix, maps=maps)
+    make_experiment_folder(arm, folder, runs=runs, maps=maps)
     for name in FILES:
         check_writable(folder / name)
     with terminal.progress_bar("operators and controllers") as on_progress:
         result = write_experiment(
-            arm, plan, folder, line_seed=line_seed, runs_as=suffix, maps=maps,
+            arm, plan, folder, line_seed=line_seed, runs=runs, maps=maps,
             command=shlex.join(words), jobs=jobs, on_progress=on_progress,
         )  # fmt: skip
     terminal.print_result(result, report_experiment, as_json=as_json)

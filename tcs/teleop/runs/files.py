@@ -1,4 +1,4 @@
-"""Run files: CSV or Parquet, one row per sample.
+"""Run files: CSV, one row per sample.
 
 The columns of joint positions have the names of the joints, in radians, so that
 `tcs capability record RUN.csv` makes a capability map of a run file.
@@ -23,7 +23,7 @@ from tcs.teleop.runs.run import ARRAYS, IntArray, Run
 if TYPE_CHECKING:
     import pandas as pd
 
-FORMATS = (".csv", ".parquet")
+SUFFIX = ".csv"
 MAX_BYTES = 1024**3
 """Most bytes of a run file: some hours at 100 samples a second."""
 VERSION = 2
@@ -37,40 +37,26 @@ _BOOLEANS = ("clutch", "singular", "stopped")
 
 
 def save_run(path: Path, run: Run) -> None:
-    """Write a run as CSV or Parquet, by the suffix of the path; completely or not at all.
-
-    CSV stores ten digits, Parquet all of them.
+    """Write a run, completely or not at all.
 
     Raises:
-        OutputError: If the file cannot be written, its suffix is unknown, or the library for
-            Parquet is not installed.
+        OutputError: If the file cannot be written, or its suffix is not that of a run.
     """
-    check_format(path)
-    frame = _to_frame(run)
-    if path.suffix == ".csv":
-        # Ten digits: 1e-9 rad and 1e-10 m, far below any encoder, at half the size.
-        content = frame.to_csv(index=False, float_format="%.10g").encode()
-    else:
-        buffer = io.BytesIO()
-        frame.to_parquet(buffer, engine="pyarrow", index=False)
-        content = buffer.getvalue()
+    check_suffix(path)
+    # Ten digits: 1e-9 rad and 1e-10 m, far below any encoder, at half the size.
+    content = _to_frame(run).to_csv(index=False, float_format="%.10g").encode()
     with whole_file(path, "Run") as stream:
         stream.write(content)
 
 
-def check_format(path: Path) -> None:
+def check_suffix(path: Path) -> None:
     """Check the suffix of a path to write a run to.
 
     Raises:
-        OutputError: If the suffix is unknown, or the library for Parquet is not installed.
+        OutputError: If it is not that of a run.
     """
-    if path.suffix not in FORMATS:
-        raise OutputError(f"'{path}' ends in '{path.suffix}'; a run is {' or '.join(FORMATS)}.")
-    if path.suffix == ".parquet" and not _has_parquet():
-        raise OutputError(
-            f"'{path}' needs a library that is not installed: pip install 'tcs[parquet]'. "
-            "Or write .csv."
-        )
+    if path.suffix != SUFFIX:
+        raise OutputError(f"'{path}' ends in '{path.suffix}'; a run is {SUFFIX}.")
 
 
 def load_run(path: Path) -> Run:
@@ -98,18 +84,12 @@ def _read(path: Path, where: str) -> pd.DataFrame:
     """
     import pandas as pd
 
-    if path.suffix not in FORMATS:
-        raise DataFileError(f"{where} ends in '{path.suffix}'; must be {' or '.join(FORMATS)}.")
-    if path.suffix == ".parquet" and not _has_parquet():
-        raise DataFileError(
-            f"{where} needs a library that is not installed: pip install 'tcs[parquet]'."
-        )
+    if path.suffix != SUFFIX:
+        raise DataFileError(f"{where} ends in '{path.suffix}'; must be {SUFFIX}.")
     content = read_bytes(path, where, DataFileError, limit=MAX_BYTES)
     try:
-        if path.suffix == ".parquet":
-            return pd.read_parquet(io.BytesIO(content), engine="pyarrow")
         frame = pd.read_csv(io.BytesIO(content), keep_default_na=False, low_memory=False)
-    # pandas and its engines raise various exceptions on a broken file.
+    # pandas raises various exceptions on a broken file.
     except Exception as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise DataFileError(f"{where} is not a table: {reason}.") from None
@@ -121,12 +101,6 @@ def _read(path: Path, where: str) -> pd.DataFrame:
             "again."
         )
     return frame
-
-
-def _has_parquet() -> bool:
-    from importlib.util import find_spec
-
-    return find_spec("pyarrow") is not None
 
 
 def _to_frame(run: Run) -> pd.DataFrame:

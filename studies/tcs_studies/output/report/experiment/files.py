@@ -18,7 +18,6 @@ from tcs.output.report.html import as_html
 from tcs.output.report.markdown import as_markdown
 from tcs.teleop import Arm
 from tcs.teleop.line import Course
-from tcs.teleop.runs.files import check_format
 from tcs_studies.experiment.course import find_course
 from tcs_studies.experiment.maps import ControllerMaps, check_map_robot, controller_maps
 from tcs_studies.experiment.trial import MEASURES
@@ -33,31 +32,28 @@ from tcs_studies.output.report.experiment.page import experiment_page
 FILES = ("experiment.html", "experiment.md", "trials.csv", "line.json")
 
 
-def make_experiment_folder(arm: Arm, out: Path, *, runs_as: str | None, maps: bool) -> Path | None:
+def make_experiment_folder(arm: Arm, out: Path, *, runs: bool, maps: bool) -> Path | None:
     """Make the folder of an experiment, after a check that its files can be written.
 
     Args:
         arm: The arm.
         out: The folder.
-        runs_as: Suffix of the run files; None where trials are not saved.
+        runs: Whether the runs of counted trials are to be saved.
         maps: Whether capability maps are to be made.
 
     Returns:
         The folder of the run files; None where trials are not saved.
 
     Raises:
-        OutputError: If the folder cannot be made, or the suffix is unknown.
+        OutputError: If the folder cannot be made.
         RobotError: If maps are to be made and the robot has no head file.
     """
-    runs = None
-    if runs_as is not None:
-        runs = out / "runs"
-        check_format(runs / f"run{runs_as}")
     if maps:
         check_map_robot(arm)
     # After the checks, so that an error leaves no empty folder.
-    make_folder(runs or out)
-    return runs
+    folder = out / "runs" if runs else None
+    make_folder(folder or out)
+    return folder
 
 
 def write_experiment(
@@ -66,7 +62,7 @@ def write_experiment(
     out: Path,
     *,
     line_seed: int = 0,
-    runs_as: str | None = None,
+    runs: bool = False,
     maps: bool = False,
     command: str,
     jobs: int = 1,
@@ -79,7 +75,7 @@ def write_experiment(
         plan: Operators, trials, seed and conditions.
         out: The folder for `FILES`, and for runs and maps if requested.
         line_seed: Seed of the search for the line.
-        runs_as: Suffix of the run files, ".csv" or ".parquet"; None to save none.
+        runs: Whether to save the runs of counted trials.
         maps: Whether to write the capability map of each controller.
         command: The command that repeats the experiment.
         jobs: Number of processes; the results do not depend on it.
@@ -90,12 +86,9 @@ def write_experiment(
         TcsError: If no line is found for the robot.
     """
     began = time.monotonic()
-    runs = make_experiment_folder(arm, out, runs_as=runs_as, maps=maps)
+    folder = make_experiment_folder(arm, out, runs=runs, maps=maps)
     course = find_course(arm, line_seed)
-    experiment = run_experiment(
-        arm, course, plan, runs=runs, runs_as=runs_as or ".csv", jobs=jobs,
-        on_progress=on_progress,
-    )  # fmt: skip
+    experiment = run_experiment(arm, course, plan, runs=folder, jobs=jobs, on_progress=on_progress)
     by_controller = controller_maps(experiment) if maps else None
     seconds = time.monotonic() - began
     page = experiment_page(experiment, by_controller, seconds=seconds, command=command)
@@ -123,7 +116,7 @@ def write_experiment(
         "seconds": seconds,
         **_numbers(experiment, by_controller),
         "files": files,
-        "runs": None if runs is None else str(runs),
+        "runs": None if folder is None else str(folder),
     }
 
 
