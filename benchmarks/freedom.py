@@ -26,7 +26,7 @@ from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.rows import Rows, rows_at
 from tcs.kernel.scores import BODY_BLOCKED, REACHED
 from tcs.kernel.sweep import score
-from tcs.kernel.verification.free_scans import at_poses
+from tcs.kernel.verification.scans import at_poses
 from tcs.model.tasks import Freedom, Task, load_task
 from tcs.placement.robustness.statistics import binomial_interval
 from tcs.placement.scoring import load_job

@@ -18,7 +18,8 @@ from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.rows import rows_at
 from tcs.kernel.sweep import gripper_contacts
-from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan
+from tcs.kernel.verification.dense import DENSE_SAMPLES
+from tcs.kernel.verification.scans import dense_scan
 from tcs.model.scene import LoweredScene, Scene, goal_poses
 from tcs.placement.scoring import load_job, sweep
 from tcs.placement.scoring.job import Job

@@ -12,7 +12,7 @@ from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import grid_rows
 from tcs.kernel.scores import BODY_BLOCKED, NEARNESS, REACHED
 from tcs.kernel.sweep import blocked_grippers, gripper_contacts
-from tcs.kernel.verification.dense import dense_scans
+from tcs.kernel.verification.scans import dense_scans
 from tcs.model.tasks import Freedom
 from tests.kernel.shapes import about
 from tests.kernel.test_freedom import CHAIN

@@ -10,8 +10,9 @@ from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import grid_rows, rows_at
 from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED
 from tcs.kernel.verification import dense
-from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan, dense_scans
+from tcs.kernel.verification.dense import DENSE_SAMPLES
 from tcs.kernel.verification.plain_dexterity import isotropy
+from tcs.kernel.verification.scans import dense_scan, dense_scans
 from tests.kernel.judge import chain_of
 from tests.kernel.sampled import slack_and_measure
 from tests.kernel.toy import scores_of, toy_grid, toy_scene

@@ -18,9 +18,9 @@ from tcs.kernel.rows import rows_at
 from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED, TOO_FAR
 from tcs.kernel.six_joints.solutions import six_joint_solutions
 from tcs.kernel.solvers import new_solver
-from tcs.kernel.verification.dense import dense_scan
 from tcs.kernel.verification.newton_solutions import newton_solutions, within
 from tcs.kernel.verification.plain_dexterity import measured, prescribed
+from tcs.kernel.verification.scans import dense_scan
 from tcs.model.tasks import Freedom
 from tests.kernel.judge import stratified
 from tests.kernel.shapes import about, around, random_arm, rotation
@@ -140,7 +140,7 @@ def test_kernel_agrees_with_reference(rng):
 
 @pytest.mark.parametrize("tilt", [0.0, 0.4], ids=["rotation", "cone"])
 def test_dense_scan_finds_what_the_sweep_finds(tilt, rng, monkeypatch):
-    monkeypatch.setattr("tcs.kernel.verification.free_scans.POSES", 100)
+    monkeypatch.setattr("tcs.kernel.verification.scans.POSES", 100)
     scene, grid = scene_of(Freedom(axis=AXIS, rotates=True, tilt=tilt)), toy_grid(states=1)
     problem, scores = build_problem(scene), scores_of(scene, grid)
     sampled = np.isin(scores.reason, (REACHED, JOINT_LIMITS, ARM_BLOCKED, TOO_FAR))

@@ -20,9 +20,8 @@ from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import grid_rows, rows_at
 from tcs.kernel.scores import ARM_BLOCKED, BODY_BLOCKED, JOINT_LIMITS, REACHED, TOO_FAR
 from tcs.kernel.sweep import blocked_grippers, gripper_contacts
-from tcs.kernel.verification import free_scans
-from tcs.kernel.verification.dense import dense_scans
-from tcs.kernel.verification.free_scans import drawn_poses
+from tcs.kernel.verification import scans
+from tcs.kernel.verification.scans import dense_scans, drawn_poses
 from tcs.model.tasks import Freedom
 from tests.kernel.shapes import about, random_arm, rotation, straight_arm
 from tests.kernel.test_six_joints import six_joint_chain
@@ -195,8 +194,8 @@ def test_kernel_agrees_with_reference():
 
 @pytest.mark.parametrize("name", FREEDOMS)
 def test_dense_scan_finds_no_further_solution(name, rng, monkeypatch):
-    monkeypatch.setattr(free_scans, "ANGLES", 72)
-    monkeypatch.setattr(free_scans, "POSES", 100)
+    monkeypatch.setattr(scans, "ANGLES", 72)
+    monkeypatch.setattr(scans, "POSES", 100)
     scene, grid = scene_with(FREEDOMS[name]), toy_grid(states=1)
     scores, problem = scores_of(scene, grid), build_problem(scene)
     never = np.isin(scores.reason, (JOINT_LIMITS, ARM_BLOCKED, TOO_FAR))
@@ -515,10 +514,10 @@ def test_a_pose_free_of_contact_among_blocked_ones_is_found():
     for goal in range(3):
         left = np.flatnonzero(~np.isin(scores.reason[:, goal], (REACHED, BODY_BLOCKED)))
         assert len(left) > 10
-        posed = free_scans.at_poses(problem, 0, goal)
+        posed = scans.at_poses(problem, 0, goal)
         for h in left:
             # Goals of the scan are poses without freedom.
-            assert free_scans.best_score(posed, rows_at(grid, [h]))[0] < 0.0
+            assert scans.best_score(posed, rows_at(grid, [h]))[0] < 0.0
 
 
 def test_samples_of_any_orientation_leave_no_wide_gap():

@@ -9,7 +9,8 @@ from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import rows_at
 from tcs.kernel.scores import REACHED
 from tcs.kernel.sweep import score as scores_of
-from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan
+from tcs.kernel.verification.dense import DENSE_SAMPLES
+from tcs.kernel.verification.scans import dense_scan
 from tcs.placement.scoring import load_job
 from tests.kernel.judge import is_true
 

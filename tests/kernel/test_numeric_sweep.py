@@ -24,8 +24,8 @@ from tcs.kernel.scores import (
     TOO_FAR,
 )
 from tcs.kernel.sweep import _score_rows
-from tcs.kernel.verification.dense import dense_scan
 from tcs.kernel.verification.plain_dexterity import isotropy
+from tcs.kernel.verification.scans import dense_scan
 from tcs.placement.scoring import load_job
 from tests.kernel.arms import drake_arm
 from tests.kernel.judge import chain_of, is_true

@@ -9,8 +9,9 @@ from tcs.kernel.dexterity import MEASURES
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import rows_at
 from tcs.kernel.scores import REACHED
-from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan
+from tcs.kernel.verification.dense import DENSE_SAMPLES
 from tcs.kernel.verification.plain_dexterity import measured
+from tcs.kernel.verification.scans import dense_scan
 from tests.chosen import some_of
 from tests.kernel.judge import chain_of, compare, stratified
 from tests.kernel.toy import scores_of, toy_grid, toy_scene

@@ -21,9 +21,9 @@ from tcs.kernel.six_joints.solutions import (
     solve_poses,
     solve_six_joints,
 )
-from tcs.kernel.verification.dense import dense_scan
 from tcs.kernel.verification.newton_solutions import newton_solutions, within
 from tcs.kernel.verification.plain_dexterity import measured
+from tcs.kernel.verification.scans import dense_scan
 from tests.kernel.judge import compare, is_true, stratified
 from tests.kernel.shapes import around, random_arm, random_joints, rotation
 from tests.kernel.toy import scores_of, toy_grid, toy_scene

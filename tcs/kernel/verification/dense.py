@@ -17,7 +17,6 @@ from tcs.kernel.contacts import NO_CONTACT, arm_contact, at_goal, gripper_body_c
 from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.problem import Problem, chain_of
 from tcs.kernel.rows import Rows
-from tcs.kernel.verification.free_scans import free_scans
 from tcs.kernel.verification.newton_solutions import newton_solutions, within
 from tcs.kernel.verification.numeric_dense import STARTS, numeric_dense_scans
 from tcs.kernel.views import unowned
@@ -34,33 +33,15 @@ DENSE_SAMPLES = 11_520
 """Angles of the free joint in a dense scan: one every 1/32 degree of a full turn."""
 
 
-def dense_scan(problem: Problem, row: Rows, goal: int, samples: int, joints: FloatArray) -> float:
-    """Return the dexterity of the best collision-free sample of one pair, -1 if none is free.
-
-    Args:
-        problem: The scene and its goals.
-        row: The configuration.
-        goal: As in `dense_scans`.
-        samples: As in `dense_scans`.
-        joints: Filled with the joint angles of the solution [rad] if there is one, shape (7,).
-    """
-    pairs, found = np.array([[0, goal]]), np.empty((1, 7))
-    (value,) = dense_scans(problem, row, pairs, samples, found)
-    if value >= 0.0:
-        joints[:] = found[0]
-    return float(value)
-
-
-def dense_scans(
+def scans_of_poses(
     problem: Problem, rows: Rows, pairs: IntArray, samples: int, joints: FloatArray
 ) -> NDArray[np.float64]:
-    """Return the dexterity of the best collision-free sample of each pair, -1 where none is free.
+    """Return the dexterity of the best free sample of each pair at single poses, -1 where none is.
 
     With a closed form, every sample of the free joint is solved on every branch, and more are added
     where a joint moves farther than COARSE from one to the next. Solutions within the joint limits
     are checked for contacts in descending order of their measure; the best one is not refined.
-    Without a closed form, `numeric_dense_scans` is used; for six joints, `six_joint_scans`. A goal
-    of several poses, or with freedom, is scanned at many of them (`free_scans`).
+    Without a closed form, `numeric_dense_scans` is used; for six joints, `six_joint_scans`.
     Contacts of base and gripper with the environment are not checked. The GIL is released.
 
     Args:
@@ -72,8 +53,6 @@ def dense_scans(
             a closed form.
         joints: Filled with the joint angles of each solution [rad], shape (n, 7).
     """
-    if problem.goals.freedom.first.size or problem.goals.first_pose.size:
-        return free_scans(problem, rows, pairs, samples, joints)
     if problem.chain.joints == 6:
         return six_joint_scans(problem, rows, pairs, joints)
     if is_outside(problem.arm):

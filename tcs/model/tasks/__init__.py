@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from tcs.model.tasks.files import load_task, task_names
 from tcs.model.tasks.freedom import Freedom
-from tcs.model.tasks.hand import Hand, partners
+from tcs.model.tasks.hand import Hand
 from tcs.model.tasks.surface import Surface
-from tcs.model.tasks.task import TOOL_SPEED, Goal, GoalPose, KeepOut, Task
+from tcs.model.tasks.task import TOOL_SPEED, Goal, GoalPose, KeepOut, Task, partners
 from tcs.model.tasks.tool_line import ToolLine
 
 __all__ = [

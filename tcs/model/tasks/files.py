@@ -15,9 +15,8 @@ from tcs.errors import TaskError, UnknownNameError
 from tcs.files.documents import Document, read_document
 from tcs.files.paths import DataFiles, expanded, is_path
 from tcs.model.tasks.freedom import Freedom
-from tcs.model.tasks.hand import partners
 from tcs.model.tasks.surface import Surface
-from tcs.model.tasks.task import Goal, GoalPose, KeepOut, Task
+from tcs.model.tasks.task import Goal, GoalPose, KeepOut, Task, partners
 from tcs.model.tasks.tool_line import DEFAULT_APPROACH, ToolLine
 
 POSE = ("body_frame", "position", "quaternion_wxyz")

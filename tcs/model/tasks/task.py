@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tcs.errors import TaskError, UnknownNameError
 from tcs.files.quantities import GOALS, SIZE, UNIT_TOLERANCE, WEIGHT
 from tcs.model.tasks.freedom import Freedom
-from tcs.model.tasks.hand import Hand, hands
+from tcs.model.tasks.hand import Hand
 from tcs.model.tasks.surface import Surface
 from tcs.model.tasks.tool_line import (
     DEFAULT_APPROACH,
@@ -298,3 +298,54 @@ class Task:
     def grid_changes(self, environment: str) -> Mapping[str, Mapping[str, object]]:
         """Return the changes to the axes of an environment's grid, empty if there are none."""
         return self.grids.get(environment, {})
+
+
+def partners(goals: Sequence[Goal]) -> tuple[int | None, ...]:
+    """Return the number of the goal that is reached together with each goal, None for none.
+
+    Raises:
+        TaskError: If a goal belongs to two pairs, or both goals of a pair are of one arm.
+        UnknownNameError: If no goal, or more than one, has the name of a partner.
+    """
+    found: list[int | None] = [None] * len(goals)
+    names = [goal.name for goal in goals]
+    for i, goal in enumerate(goals):
+        if not goal.together_with:
+            continue
+        where = f"goals[{i}], field 'together_with'"
+        named = [j for j, name in enumerate(names) if name == goal.together_with and j != i]
+        if not named:
+            known = {name for j, name in enumerate(names) if name and j != i}
+            raise UnknownNameError("goal", goal.together_with, known, where=where)
+        if len(named) > 1:
+            raise TaskError(
+                f"{where}: {len(named)} goals are called '{goal.together_with}'. Give each a name "
+                "of its own."
+            )
+        j = named[0]
+        if {found[i], found[j]} - {None} and (found[i], found[j]) != (j, i):
+            raise TaskError(
+                f"{where}: '{goal.together_with}' or this goal is in another pair already. A pair "
+                "is two goals: write a goal twice, with two names, to have it in two pairs."
+            )
+        if not goal.arm or not goals[j].arm or goal.arm == goals[j].arm:
+            arms = [one.arm or "no arm" for one in (goal, goals[j])]
+            raise TaskError(
+                f"{where}: the two goals name {' and '.join(arms)}, but two arms reach them at "
+                "once. Give each goal its own 'arm'."
+            )
+        found[i], found[j] = j, i
+    return tuple(found)
+
+
+def hands(goals: Sequence[Goal]) -> tuple[Hand, ...]:
+    """Return the hand of each goal.
+
+    Raises:
+        TaskError: As `partners`.
+        UnknownNameError: As `partners`.
+    """
+    others = (None if j is None else (goals[j].arm, goals[j].tool) for j in partners(goals))
+    return tuple(
+        Hand(goal.arm, goal.tool, other) for goal, other in zip(goals, others, strict=True)
+    )

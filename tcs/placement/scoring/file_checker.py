@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from tcs.files.mapped import chunks
 from tcs.kernel.problem import Problem
 from tcs.kernel.rows import rows_at
-from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scans
+from tcs.kernel.verification.dense import DENSE_SAMPLES
+from tcs.kernel.verification.scans import dense_scans
 from tcs.model.tasks import partners
 from tcs.placement.scoring.drake_check import DrakeChecker, Finding, of_both
 from tcs.placement.scoring.job import whole_task

@@ -9,7 +9,7 @@ import pytest
 
 from tcs.files.paths import data_folder
 from tcs.kernel.approach import regions
-from tcs.kernel.verification import free_scans
+from tcs.kernel.verification import scans
 from tcs.model.tasks import Freedom
 from tcs.motion import check_approaches
 from tcs.placement.scoring import load_job, score, verify
@@ -45,7 +45,7 @@ def test_freedom_only_adds_to_what_is_reached(file, paths):
 
 
 def test_drake_confirms_poses_within_the_freedom(file, monkeypatch):
-    monkeypatch.setattr(free_scans, "ANGLES", 72)
+    monkeypatch.setattr(scans, "ANGLES", 72)
     found = verify(file, pairs=60, dense=3)
     assert found.is_sound
     assert (found.checked, found.missed) == (60, 0)

@@ -284,7 +284,8 @@ class OperatorInput:
     ) -> Command:
         clutch = self.clutch or pad.clutch or hand.clutch
         if self.mode is Mode.JOINT and self.set_point is not None:
-            wanted = None if clutch else self.set_point.read(reading, self.source)
+            sliders, set_slider = reading.sliders, self.source.set_slider
+            wanted = None if clutch else self.set_point.read(sliders, set_slider)
             return Command(mode=self.mode, joints=wanted, clutch=clutch)
         if self.mode in NULL_SPACE_MODES:
             down, up = (self._is_on(name, reading, now) for name in (TURN_DOWN, TURN_UP))

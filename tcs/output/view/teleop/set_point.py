@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from tcs.output.view.teleop.controls import Reading, Source
 
 FloatArray = NDArray[np.float64]
 JOINT_STEP = 0.5
@@ -59,22 +55,25 @@ class SetPoint:
         """Give the set-point up: the sliders begin at the posture when it is read next."""
         self._wanted = None
 
-    def read(self, reading: Reading, source: Source) -> FloatArray:
+    def read(
+        self, sliders: Mapping[str, float], set_slider: Callable[[str, float], float]
+    ) -> FloatArray:
         """Return the set-point [rad], shape (7,).
 
         Args:
-            reading: State of the controls.
-            source: The controls, whose sliders are set to the posture when joint mode begins.
+            sliders: Value of each slider.
+            set_slider: Sets a slider and returns its value; called with the posture when joint mode
+                begins.
         """
         if self._wanted is None:
             self._wanted = np.array(self._posture(), dtype=np.float64)
             self._shown = {
-                joint_slider(i): source.set_slider(joint_slider(i), math.degrees(angle))
+                joint_slider(i): set_slider(joint_slider(i), math.degrees(angle))
                 for i, angle in enumerate(self._wanted)
             }
             return self._wanted.copy()
         for i, name in enumerate(self._shown):
-            value = reading.sliders[name]
+            value = sliders[name]
             if value != self._shown[name]:
                 self._shown[name] = value
                 self._wanted[i] = math.radians(value)

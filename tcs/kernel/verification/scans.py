@@ -1,4 +1,4 @@
-"""Dense scans of goals with freedom: their poses are drawn anew, far more densely."""
+"""Dense scans of any goals; poses of those with freedom are drawn anew, far more densely."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ from tcs.kernel.rows import Rows
 from tcs.kernel.scores import REACHED
 from tcs.kernel.sweep import gripper_contacts, score
 from tcs.kernel.together.arms import keep_free, measures_of, place_gripper_pose
+from tcs.kernel.verification.dense import scans_of_poses
 from tcs.kernel.verification.newton_solutions import newton_solutions, within
 from tcs.kernel.views import unowned
 from tcs.kernel.workspace import Workspace, new_workspace
@@ -93,6 +94,36 @@ def at_poses(problem: Problem, state: int, goal: int) -> Problem:
     )
 
 
+def dense_scan(problem: Problem, row: Rows, goal: int, samples: int, joints: FloatArray) -> float:
+    """Return the dexterity of the best collision-free sample of one pair, -1 if none is free.
+
+    Args:
+        problem: The scene and its goals.
+        row: The configuration.
+        goal: As in `dense_scans`.
+        samples: As in `dense_scans`.
+        joints: Filled with the joint angles of the solution [rad] if there is one, shape (7,).
+    """
+    pairs, found = np.array([[0, goal]]), np.empty((1, 7))
+    (value,) = dense_scans(problem, row, pairs, samples, found)
+    if value >= 0.0:
+        joints[:] = found[0]
+    return float(value)
+
+
+def dense_scans(
+    problem: Problem, rows: Rows, pairs: IntArray, samples: int, joints: FloatArray
+) -> NDArray[np.float64]:
+    """Return the dexterity of the best collision-free sample of each pair, -1 where none is free.
+
+    A goal of several poses, or with freedom, is scanned at many of them (`free_scans`). The
+    arguments are those of `scans_of_poses`.
+    """
+    if problem.goals.freedom.first.size or problem.goals.first_pose.size:
+        return free_scans(problem, rows, pairs, samples, joints)
+    return scans_of_poses(problem, rows, pairs, samples, joints)
+
+
 def free_scans(
     problem: Problem, rows: Rows, pairs: IntArray, samples: int, joints: FloatArray
 ) -> NDArray[np.float64]:
@@ -103,8 +134,6 @@ def free_scans(
     the closed form, which `six_joint_scans` checks without freedom. So has an arm of five joints,
     with the angle about the axis; where that alone is free, Newton's method finds them.
     """
-    from tcs.kernel.verification.dense import dense_scans
-
     values = np.full(len(pairs), -1.0)
     for i, (row, goal) in enumerate(pairs):
         at = rows.at(slice(row, row + 1))
@@ -123,7 +152,7 @@ def free_scans(
             continue
         tried = np.stack([np.zeros(clear.size, np.int64), clear], axis=1)
         found = np.empty((clear.size, 7))
-        of_poses = dense_scans(posed, at, tried, samples // 8, found)
+        of_poses = scans_of_poses(posed, at, tried, samples // 8, found)
         best = int(np.argmax(of_poses))
         values[i], joints[i] = of_poses[best], found[best]
     return values
