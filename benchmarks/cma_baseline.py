@@ -16,7 +16,7 @@ import numpy as np
 import tcs
 from tcs.kernel.arrays import FloatArray
 from tcs.placement.refinement import PointScorer
-from tcs.placement.refinement.search import Space
+from tcs.placement.refinement.local_search import Space
 from tcs.placement.tables import tc_manipulability, tc_reachability
 
 POPULATION, POPULATION_WITH_ENVIRONMENT = 1600, 3600

@@ -15,7 +15,7 @@ from typing import Any
 import yaml
 
 import tcs
-from tcs.capability.files import load_map
+from tcs.capability.map_files import load_map
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 TCS = (sys.executable, "-m", "tcs")

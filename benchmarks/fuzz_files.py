@@ -218,8 +218,8 @@ def _write_map(folder: Path) -> None:
 def _write_run(folder: Path) -> None:
     """Write a run of teleoperation, of random numbers."""
     from tcs.model.robots import load_robot
-    from tcs.teleop.runs.files import save_run
     from tcs.teleop.runs.run import Run
+    from tcs.teleop.runs.run_files import save_run
 
     robot = load_robot("iiwa7")
     rng, n = np.random.default_rng(0), 20
@@ -330,7 +330,7 @@ def _read_probability_map(path: Path) -> Any:
 
 
 def _read_run(path: Path) -> Any:
-    from tcs.teleop.runs.files import load_run
+    from tcs.teleop.runs.run_files import load_run
 
     return json.dumps(load_run(path).metadata)
 

@@ -313,7 +313,7 @@ def _motions(path: Path, _: int) -> None:
 
 
 def _plan(path: Path, number: int) -> None:
-    from tcs.motion.files import plan_csv, plan_messages
+    from tcs.motion.plan_files import plan_csv, plan_messages
 
     plan = _read_plan(path)
     if number % 10 == 0:

@@ -41,8 +41,8 @@ from table import header, parser, record, row, save
 import tcs
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.model.random_streams import named_generator
+from tcs.placement.refinement.local_search import Space
 from tcs.placement.refinement.points import PointScorer
-from tcs.placement.refinement.search import Space
 from tcs.placement.refinement.surest import (
     StagedSamples,
     SurestSearch,

@@ -25,8 +25,8 @@ from table import header, parser, record, row, save
 import tcs
 from tcs.kernel.arrays import FloatArray
 from tcs.model.random_streams import named_generator
+from tcs.placement.refinement.local_search import Space, Walk
 from tcs.placement.refinement.points import PointScorer
-from tcs.placement.refinement.search import Space, Walk
 from tcs.placement.refinement.success_under_error import RememberedSamples, at_surest
 from tcs.placement.refinement.surest import StagedSamples, SurestSearch, best_pairs
 from tcs.placement.robustness import PerturbedPoints, Trials

@@ -8,11 +8,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from tcs.capability.arplace.files import MAP as PROBABILITY_MAP
-from tcs.capability.arplace.files import MODEL as ARPLACE_MODEL
-from tcs.capability.arplace.files import load_arplace, load_probability_map
-from tcs.capability.files import FORMAT as CAPABILITY_MAP
-from tcs.capability.files import load_map
+from tcs.capability.arplace.model_files import MAP as PROBABILITY_MAP
+from tcs.capability.arplace.model_files import MODEL as ARPLACE_MODEL
+from tcs.capability.arplace.model_files import load_arplace, load_probability_map
+from tcs.capability.map_files import FORMAT as CAPABILITY_MAP
+from tcs.capability.map_files import load_map
 from tcs.errors import StoreFormatError
 from tcs.files.blocks import FORMAT as BLOCK
 from tcs.files.blocks import MANIFEST, load_block, load_manifest
@@ -104,7 +104,7 @@ def _load_plan(path: Path) -> object:
 
 def _load_run(path: Path) -> object:
     # Reading a run loads pandas.
-    from tcs.teleop.runs.files import load_run
+    from tcs.teleop.runs.run_files import load_run
 
     return load_run(path)
 

@@ -38,12 +38,12 @@ def folder(scripts, tmp_path_factory):
     from tcs.model.robots import load_robot
     from tcs.motion import save_plan
     from tcs.placement.store import save_motions, save_scores
-    from tcs.teleop.runs.files import save_run
+    from tcs.teleop.runs.run_files import save_run
     from tests.capability.arplace.example import model
     from tests.capability.test_map import small_map
     from tests.placement.store.example import score_file
     from tests.placement.store.test_motion_file import motion_file, motion_table
-    from tests.teleop.runs.test_files import made
+    from tests.teleop.runs.test_run_files import made
 
     made_in = tmp_path_factory.mktemp("fuzz")
     write_scene_texts(made_in)

@@ -11,12 +11,12 @@ from tcs.files.compression import compress
 from tcs.files.joblib_file import write_joblib
 from tcs.placement.store import save_motions, save_scores
 from tcs.stored import check_file
-from tcs.teleop.runs.files import save_run
+from tcs.teleop.runs.run_files import save_run
 from tests.capability.arplace.example import model
 from tests.capability.test_map import small_map
 from tests.placement.store.example import score_file
 from tests.placement.store.test_motion_file import motion_file, motion_table
-from tests.teleop.runs.test_files import made
+from tests.teleop.runs.test_run_files import made
 
 KINDS = {
     "block": 1,

@@ -12,9 +12,9 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from tcs.capability.files import load_map, save_map
 from tcs.capability.grid import MapGrid
 from tcs.capability.map import CapabilityMap
+from tcs.capability.map_files import load_map, save_map
 from tcs.capability.merge import BasePose, TaskMap, merge
 from tcs.capability.recording import Recording, read_csv, recording_of, write_csv
 from tcs.capability.sequence import Stop, split

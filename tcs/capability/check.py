@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tcs.capability.files import load_map, robot_reference, stored_name
 from tcs.capability.grid import GRASPS, SIDE, TOP, MapGrid, yaw_rotation
 from tcs.capability.map import ITCM, CapabilityMap
+from tcs.capability.map_files import load_map, robot_reference, stored_name
 from tcs.capability.reach import Reach
 from tcs.errors import GridError, StoreError, UnknownNameError
 from tcs.files.quantities import RADIUS

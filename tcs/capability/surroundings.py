@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tcs.capability.files import robot_reference, stored_name
 from tcs.capability.map import CapabilityMap
+from tcs.capability.map_files import robot_reference, stored_name
 from tcs.capability.merge import BasePose, TaskMap
 from tcs.capability.tasks import GraspTask
 from tcs.errors import SelectionError, TaskError

@@ -92,7 +92,7 @@ def plan(
     import tcs
     from tcs.files.writing import check_writable
     from tcs.motion import save_plan
-    from tcs.motion.files import check_plan_path
+    from tcs.motion.plan_files import check_plan_path
     from tcs.motion.plans import exact_state
     from tcs.output.report.score.shown_set import ShownSet
     from tcs.output.terminal.motion_tables import report_plan

@@ -11,9 +11,9 @@ from tcs.motion.approach import Access, Accesses, accesses
 from tcs.motion.approach_check import ApproachCheck, check_approaches
 from tcs.motion.curves import Curve
 from tcs.motion.examine import examine
-from tcs.motion.files import save_plan
 from tcs.motion.motion_plan import GoalResult, MotionPlan, Segment, StopPlan
 from tcs.motion.plan_check import PlanCheck, check_plan
+from tcs.motion.plan_files import save_plan
 from tcs.motion.plan_success import PlanSuccess, evaluate_plan
 from tcs.motion.plans import plan
 from tcs.motion.stops import Stop

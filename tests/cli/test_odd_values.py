@@ -12,10 +12,10 @@ from typer.main import get_command
 from tcs.capability import save_map
 from tcs.capability.arplace import query, save_arplace, save_probability_map
 from tcs.cli.app import app
-from tcs.teleop.runs.files import save_run
+from tcs.teleop.runs.run_files import save_run
 from tests.capability.arplace.example import model
 from tests.capability.test_map import small_map
-from tests.teleop.runs.test_files import made
+from tests.teleop.runs.test_run_files import made
 
 NUMBERS = ("nan", "-inf", "-1", "0", "1e150", "1e-300", "")
 INTEGERS = ("-1", "0", "9" * 23, "2147483648", "nan", "")

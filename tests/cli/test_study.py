@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from tcs.teleop.runs.files import save_run
+from tcs.teleop.runs.run_files import save_run
 from tcs_studies.output.terminal_tables import report_study
 from tcs_studies.study.participants import load_participant, new_participant, participant_names
 from tcs_studies.study.recording import StudyRecording

@@ -18,8 +18,8 @@ import pytest
 
 from tcs.teleop import Command, Teleoperation, load_arm
 from tcs.teleop.line import Line
-from tcs.teleop.runs.files import load_run, save_run
 from tcs.teleop.runs.recorder import run_from_steps
+from tcs.teleop.runs.run_files import load_run, save_run
 from tcs_studies.experiment.course import find_course
 from tcs_studies.experiment.trial import line_result
 from tcs_studies.output.terminal_tables import line_text

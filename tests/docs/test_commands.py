@@ -9,7 +9,7 @@ import pytest
 import typer.main
 
 from tcs.cli.app import app
-from tcs.model.tasks.files import GoalEntry, SurfaceEntry, TaskFile
+from tcs.model.tasks.task_files import GoalEntry, SurfaceEntry, TaskFile
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 PAGES = [CHECKOUT / "README.md", *sorted((CHECKOUT / "docs").rglob("*.md"))]

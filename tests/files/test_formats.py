@@ -29,12 +29,12 @@ from tcs.capability.arplace import (
 from tcs.errors import DataFileError, OutputError, StoreError, TcsError
 from tcs.files import reader
 from tcs.placement.store import load_scores, save_scores
-from tcs.teleop.runs.files import load_run, save_run
+from tcs.teleop.runs.run_files import load_run, save_run
 from tests.capability.arplace.example import discs
 from tests.capability.arplace.example import model as arplace
 from tests.capability.test_map import small_map
 from tests.placement.store.example import score_file
-from tests.teleop.runs.test_files import made as run
+from tests.teleop.runs.test_run_files import made as run
 
 
 @dataclass(frozen=True)

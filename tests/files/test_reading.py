@@ -20,7 +20,7 @@ from tcs.model.robots.urdf import read_urdf
 from tcs.model.robots.urdf.meshes import mesh_triangles
 from tcs.model.scene import load_environment
 from tcs.model.tasks import load_task
-from tcs.teleop.runs.files import load_run
+from tcs.teleop.runs.run_files import load_run
 
 READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "task": (".yaml", load_task),

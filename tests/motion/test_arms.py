@@ -8,8 +8,8 @@ import pytest
 import tcs
 from tcs.model.scene import ErrorDistribution
 from tcs.motion import load_plan, save_plan
-from tcs.motion.files import plan_csv
 from tcs.motion.plan_check import check_plan
+from tcs.motion.plan_files import plan_csv
 from tcs.motion.plan_success import evaluate_plan
 from tests.environments import CORNER, write_environment
 

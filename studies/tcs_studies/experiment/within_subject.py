@@ -19,8 +19,8 @@ from tcs.kernel.arrays import FloatArray
 from tcs.teleop.arm import Arm
 from tcs.teleop.control.latency import NO_LATENCY, Latency
 from tcs.teleop.line import Course
-from tcs.teleop.runs.files import SUFFIX, save_run
 from tcs.teleop.runs.run import Run
+from tcs.teleop.runs.run_files import SUFFIX, save_run
 from tcs_studies.experiment.comparison import Comparison
 from tcs_studies.experiment.order import counterbalanced_orders
 from tcs_studies.experiment.phases import WorkOverTime, work_over_time

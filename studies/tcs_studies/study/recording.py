@@ -11,8 +11,8 @@ from tcs.errors import DataFileError
 from tcs.files.documents import read_mapping
 from tcs.files.reading import read_bytes
 from tcs.files.writing import make_folder, whole_file
-from tcs.teleop.runs.files import MAX_BYTES, load_run, save_run
 from tcs.teleop.runs.run import Run
+from tcs.teleop.runs.run_files import MAX_BYTES, load_run, save_run
 from tcs_studies.experiment.trial import TrialMeasures
 from tcs_studies.study.forms import Form
 from tcs_studies.study.participants import (

@@ -12,7 +12,7 @@ import numpy as np
 from tcs.errors import DataFileError
 from tcs.files.reading import read_bytes
 from tcs.kernel.arrays import FloatArray
-from tcs.teleop.runs.files import MAX_BYTES, load_run
+from tcs.teleop.runs.run_files import MAX_BYTES, load_run
 from tcs_studies.experiment.comparison import Comparison
 from tcs_studies.experiment.questionnaires import van_der_laan, weighted_workload
 from tcs_studies.experiment.trial import MEASURES, TrialMeasures, sampled_path

@@ -9,13 +9,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from tcs.capability.arplace.boundary import Classifier
-from tcs.capability.arplace.files import (
+from tcs.capability.arplace.model import Arplace, Errors, reconstruction_errors
+from tcs.capability.arplace.model_files import (
     load_arplace,
     load_probability_map,
     save_arplace,
     save_probability_map,
 )
-from tcs.capability.arplace.model import Arplace, Errors, reconstruction_errors
 from tcs.capability.arplace.point_distribution import PointDistribution
 from tcs.capability.arplace.probability_map import FloorObstacle, ProbabilityMap, merge_maps
 from tcs.capability.arplace.query import ObjectPose, Query, covariance_of, query

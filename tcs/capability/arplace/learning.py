@@ -12,7 +12,7 @@ import numpy as np
 from tcs.capability.arplace.boundary import Classifier, region_of
 from tcs.capability.arplace.labels import label
 from tcs.capability.arplace.model import Arplace
-from tcs.capability.arplace.shapes import (
+from tcs.capability.arplace.region_vectors import (
     AUTOMATIC,
     BY_SHAPE,
     EQUIDISTANT,

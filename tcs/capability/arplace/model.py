@@ -11,7 +11,7 @@ import numpy as np
 
 from tcs.capability.arplace.boundary import FARTHEST, Boundary
 from tcs.capability.arplace.landmarks import COUNT
-from tcs.capability.arplace.shapes import (
+from tcs.capability.arplace.region_vectors import (
     REPRESENTATIONS,
     SIGNED_DISTANCE,
     boundary_from,

@@ -12,7 +12,7 @@ import numpy as np
 
 from tcs.capability.arplace.model import Arplace
 from tcs.capability.arplace.probability_map import FloorObstacle, ProbabilityMap
-from tcs.capability.arplace.shapes import SIGNED_DISTANCE, counts_inside
+from tcs.capability.arplace.region_vectors import SIGNED_DISTANCE, counts_inside
 from tcs.capability.arplace.table_error import displaced, displacement_covariance
 from tcs.capability.arplace.task import PARAMETERS
 from tcs.errors import SelectionError

@@ -68,7 +68,7 @@ def show(
 ) -> None:
     """Print a summary of a model or a map, and draw it."""
     from tcs.capability.arplace import load_arplace, load_probability_map
-    from tcs.capability.arplace.files import is_probability_map
+    from tcs.capability.arplace.model_files import is_probability_map
 
     if figure is not None and out is None:
         raise typer.BadParameter("requires --out.", param_hint="--figure")

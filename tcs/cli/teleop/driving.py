@@ -108,7 +108,7 @@ def live(
 
     from tcs.files.writing import check_writable
     from tcs.output.view.teleop.session import LiveOptions, LiveSession
-    from tcs.teleop.runs.files import check_suffix, save_run
+    from tcs.teleop.runs.run_files import check_suffix, save_run
 
     if save is not None:
         check_suffix(save)

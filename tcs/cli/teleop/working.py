@@ -26,7 +26,7 @@ def work(
 ) -> None:
     """Print the work on the device in a run along the line, before, in and after the solution."""
     from tcs.teleop.line import GOAL_RADIUS
-    from tcs.teleop.runs.files import load_run
+    from tcs.teleop.runs.run_files import load_run
     from tcs_studies.experiment.phases import attempt_work
     from tcs_studies.output.terminal_tables import report_work
 

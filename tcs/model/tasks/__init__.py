@@ -5,11 +5,11 @@ In: task files. Out: checked goals with weights, allowed contacts, and changes t
 
 from __future__ import annotations
 
-from tcs.model.tasks.files import load_task, task_names
 from tcs.model.tasks.freedom import Freedom
 from tcs.model.tasks.hand import Hand
 from tcs.model.tasks.surface import Surface
 from tcs.model.tasks.task import TOOL_SPEED, Goal, GoalPose, KeepOut, Task, partners
+from tcs.model.tasks.task_files import load_task, task_names
 from tcs.model.tasks.tool_line import ToolLine
 
 __all__ = [

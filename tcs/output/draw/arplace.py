@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tcs.capability.arplace import Arplace, ProbabilityMap
 from tcs.capability.arplace.boundary import Boundary
 from tcs.capability.arplace.polygons import inside
-from tcs.capability.arplace.shapes import boundary_from
+from tcs.capability.arplace.region_vectors import boundary_from
 from tcs.capability.arplace.success_model import LINEAR, QUADRATIC
 from tcs.kernel.arrays import FloatArray
 from tcs.output.draw.colours import ARM, FURNITURE, HERE, MEMBER, SCALE

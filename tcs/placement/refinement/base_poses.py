@@ -22,8 +22,8 @@ from tcs.model.random_streams import named_generator
 from tcs.model.robots import RobotFile
 from tcs.model.scene import EMPTY_ENVIRONMENT, Scene, SceneSpec, lower
 from tcs.placement.constraints import Obstacle
+from tcs.placement.refinement.local_search import LocalSearch, ScoreObjective, Space
 from tcs.placement.refinement.points import PointScores
-from tcs.placement.refinement.search import LocalSearch, ScoreObjective, Space
 from tcs.placement.scoring.job import with_obstacles
 from tcs.placement.scoring.kernel_start import warm_up
 from tcs.placement.scoring.scorer import Scorer

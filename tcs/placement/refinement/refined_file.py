@@ -14,8 +14,7 @@ import numpy as np
 from tcs.errors import SelectionError, TcsError, UnknownNameError
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.model.random_streams import check_draws, named_generator
-from tcs.placement.refinement.points import PointScorer
-from tcs.placement.refinement.search import (
+from tcs.placement.refinement.local_search import (
     LocalSearch,
     Samples,
     ScoreObjective,
@@ -23,6 +22,7 @@ from tcs.placement.refinement.search import (
     Walk,
     without_idle_members,
 )
+from tcs.placement.refinement.points import PointScorer
 from tcs.placement.refinement.success_under_error import (
     HARDEST,
     DisplacedBases,

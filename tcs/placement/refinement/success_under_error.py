@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.model.grid import ROBOT_AXES
+from tcs.placement.refinement.local_search import Samples, Walk
 from tcs.placement.refinement.points import PointScorer
-from tcs.placement.refinement.search import Samples, Walk
 from tcs.placement.tables import tc_reachability
 
 RADIUS = 0.05

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
-from tcs.placement.refinement.search import (
+from tcs.placement.refinement.local_search import (
     GAIN,
     TIE,
     Evaluated,

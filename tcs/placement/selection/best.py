@@ -25,6 +25,7 @@ from tcs.placement.selection.admission import (
 )
 from tcs.placement.selection.alternatives import Distinct, Top
 from tcs.placement.selection.bounds import Bounds
+from tcs.placement.selection.branch_and_bound import best_set
 from tcs.placement.selection.choice import Choice, SelectionTables, changed_axes
 from tcs.placement.selection.distances import ON_EDGE, LatticeDistances
 from tcs.placement.selection.estimated import (
@@ -37,7 +38,6 @@ from tcs.placement.selection.observed import Match, nearest_table
 from tcs.placement.selection.penalties import Penalties, penalties_of
 from tcs.placement.selection.ranking import Ranking, ranking_of
 from tcs.placement.selection.refined import RefinedQuery, grid_only
-from tcs.placement.selection.search import best_set
 from tcs.placement.selection.travel import Legs, TravelWeights, legs_from, shortest_tour
 from tcs.placement.selection.utility import UtilityWeights, utility
 from tcs.placement.store import MotionFile, ScoreFile

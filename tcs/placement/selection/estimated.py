@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from tcs.errors import SelectionError
 from tcs.placement.selection.alternatives import Distinct
+from tcs.placement.selection.branch_and_bound import tour_costs
 from tcs.placement.selection.penalties import Penalties
-from tcs.placement.selection.search import tour_costs
 from tcs.placement.selection.travel import Legs
 from tcs.placement.selection.utility import UtilityWeights, utility
 from tcs.placement.tables import SetTable, SuccessTable, tc_manipulability, tc_reachability

@@ -24,7 +24,7 @@ from tcs.model.scene import (
 )
 from tcs.model.scene.contacts import Group
 from tcs.output.report.score.scene_solids import environment_solids
-from tcs.placement.refinement.search import Space
+from tcs.placement.refinement.local_search import Space
 from tcs.placement.scoring import load_job, score, verify
 
 RAILS = data_folder() / "examples/wheelchair_rails.yaml"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tcs.placement.refinement.search import Features, ScoreObjective
+from tcs.placement.refinement.local_search import Features, ScoreObjective
 
 WEIGHTS = np.array([0.75, 0.25])
 ALONE = Features(np.array([[[True, False]]]), np.array([[[0.4, 0.0]]], np.float32))

@@ -22,7 +22,13 @@ from tcs.placement.refinement import (
     refinement_summary,
     score_members,
 )
-from tcs.placement.refinement.search import Evaluated, LocalSearch, ScoreObjective, Space, Walk
+from tcs.placement.refinement.local_search import (
+    Evaluated,
+    LocalSearch,
+    ScoreObjective,
+    Space,
+    Walk,
+)
 from tcs.placement.refinement.success_under_error import (
     ANGLE,
     RADIUS,

@@ -9,7 +9,7 @@ import pytest
 
 import tcs
 from tcs.placement.refinement import PointScorer
-from tcs.placement.refinement.search import Evaluated, Space
+from tcs.placement.refinement.local_search import Evaluated, Space
 from tcs.placement.refinement.success_under_error import RememberedSamples, successes
 from tcs.placement.refinement.surest import (
     StagedSamples,

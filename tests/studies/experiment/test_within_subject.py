@@ -10,7 +10,7 @@ from tcs.errors import TcsError
 from tcs.output.report import as_html, as_markdown
 from tcs.output.report.blocks import Collapsible, Picture, Table
 from tcs.teleop import load_arm
-from tcs.teleop.runs.files import load_run
+from tcs.teleop.runs.run_files import load_run
 from tcs_studies.experiment.course import find_course
 from tcs_studies.experiment.maps import controller_maps
 from tcs_studies.experiment.trial import CONDITIONS, END_EFFECTOR, MEASURES, NOVEL, measure

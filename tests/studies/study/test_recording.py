@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tcs.errors import DataFileError, OutputError, UnknownNameError
-from tcs.teleop.runs.files import load_run, save_run
+from tcs.teleop.runs.run_files import load_run, save_run
 from tcs_studies.experiment.trial import measure
 from tcs_studies.study.forms import PAIR, background_form, difficulty_form, tlx_pairs_form
 from tcs_studies.study.participants import (

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tcs.errors import DataFileError, TcsError
-from tcs.teleop.runs.files import load_run
+from tcs.teleop.runs.run_files import load_run
 from tcs_studies.experiment.trial import TrialMeasures
 from tcs_studies.output.study.server import FormServer
 from tcs_studies.output.words import trial_words

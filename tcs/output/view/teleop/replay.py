@@ -25,8 +25,8 @@ from tcs.output.view.teleop.robot_display import TOOL, RobotDisplay, draw_course
 from tcs.teleop import Arm, Mode, Settings, load_arm
 from tcs.teleop.arm import torso_height_of
 from tcs.teleop.line import GOAL_RADIUS
-from tcs.teleop.runs.files import load_run
 from tcs.teleop.runs.run import NO_GROUP, SCRIPTED_TYPE, Run
+from tcs.teleop.runs.run_files import load_run
 
 FloatArray = NDArray[np.float64]
 TIME, SPEED = "time [s]", "speed"

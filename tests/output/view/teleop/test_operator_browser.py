@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tcs.output.view.teleop.session import LiveOptions, LiveSession
-from tcs.teleop.runs.files import load_run
+from tcs.teleop.runs.run_files import load_run
 from tests.app.test_browser import AXE, RUN_AXE
 from tests.output.view.browser import chromium
 from tests.output.view.teleop.test_browser import SLIDE

@@ -9,8 +9,8 @@ import pytest
 from tcs.capability import read_csv
 from tcs.errors import DataFileError, OutputError
 from tcs.model.robots import load_robot
-from tcs.teleop.runs.files import load_run, save_run
 from tcs.teleop.runs.run import NO_GROUP, Run
+from tcs.teleop.runs.run_files import load_run, save_run
 
 ROBOT = load_robot("tiago")
 ARRAYS = [

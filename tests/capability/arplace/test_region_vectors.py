@@ -16,7 +16,7 @@ from tcs.capability.arplace.landmarks import (
     landmarks_by_shape,
 )
 from tcs.capability.arplace.polygons import distances, inside, signed_area, winding_numbers
-from tcs.capability.arplace.shapes import BY_SHAPE, EQUIDISTANT, SIGNED_DISTANCE
+from tcs.capability.arplace.region_vectors import BY_SHAPE, EQUIDISTANT, SIGNED_DISTANCE
 from tcs.capability.arplace.success_model import SuccessModel, interpolation_features
 from tcs.errors import SelectionError, TcsError, UnknownNameError
 from tests.capability.arplace.example import TASK, discs, model, two_parts

@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tcs.placement.refinement.search import Evaluated, ScoreObjective, Walk, without_idle_members
+from tcs.placement.refinement.local_search import (
+    Evaluated,
+    ScoreObjective,
+    Walk,
+    without_idle_members,
+)
 
 WEIGHTS = np.array([0.5, 0.5])
 
