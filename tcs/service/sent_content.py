@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from tcs.errors import DataFileError, StoreError
+from tcs.errors import DataFileError
 from tcs.files.documents import Document, checked
 from tcs.output.words import frame_name, person_text
 from tcs.placement.store import ScoreFile, load_scores
@@ -53,21 +53,12 @@ def entry_of_file(path: Path, digest: str, most: int) -> FileEntry:
 
 
 def entry_of(file: ScoreFile, digest: str, size: int) -> FileEntry:
-    """Return what a score file is of.
-
-    Raises:
-        StoreError: If what it records of the person is malformed.
-    """
+    """Return what a score file is of."""
     names = {
         key: str(getattr(file, key).get("name", file.metadata[key]))
         for key in ("task", "environment", "robot")
     }
-    try:
-        person = [person_text(file.metadata["person"])] if "person" in file.metadata else []
-    except (KeyError, TypeError, ValueError, AttributeError):
-        raise StoreError(
-            "Score file: metadata 'person' is malformed. Score the task again."
-        ) from None
+    person = [person_text(file.metadata["person"])] if "person" in file.metadata else []
     return FileEntry(
         file=digest,
         bytes=size,

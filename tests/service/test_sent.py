@@ -10,7 +10,9 @@ import pytest
 
 from tcs.errors import DataFileError, ServiceError, StoreError
 from tcs.files.compression import decoded_bytes
+from tcs.files.joblib_file import write_joblib
 from tcs.placement.store import save_scores
+from tcs.placement.store.encoding import encode
 from tcs.service import Engine, Limits, ScoreRequest, SelectRequest
 from tcs.service.score_files import ScoreFiles
 from tcs.service.sent_documents import SentDocuments
@@ -32,8 +34,9 @@ def files_of(engine):
 
 @pytest.mark.parametrize("person", [5, {"sex": "female"}, {"sex": []}, {"sex": "x", "mass": 1}])
 def test_a_malformed_person_is_refused_and_its_file_removed(engine, tmp_path, person):
-    path = tmp_path / "person.tcs"
-    save_scores(path, score_file(metadata={**METADATA, "person": person}))
+    path, content = tmp_path / "person.tcs", encode(score_file())
+    content["metadata"] = {**METADATA, "person": person}
+    write_joblib(path, content, "Score file")
     with pytest.raises(StoreError, match="metadata 'person' is malformed"):
         engine.add_file(path.read_bytes())
     assert engine.files() == []

@@ -11,11 +11,8 @@ import numpy as np
 from tcs.errors import StoreError
 from tcs.model.scene import EnvironmentFile
 from tcs.model.tasks import Task
+from tcs.placement.store import PERSON
 from tcs.placement.tables import Reason, ScoreTable
-
-KEY = "person"
-"""Entry of the metadata: what is given of the person, their stature and mass, and the goals at
-which the gripper touches them."""
 
 _log = logging.getLogger(__name__)
 
@@ -49,7 +46,7 @@ def person_entry(
         {"goal": goal, "name": task.goals[goal].name, "part": part}
         for goal, part in touching.items()
     ]
-    return {KEY: {**person.to_json(), "touching_goals": goals}}
+    return {PERSON: {**person.to_json(), "touching_goals": goals}}
 
 
 def recorded_person(record: Mapping[str, Any]) -> Mapping[str, Any] | None:
@@ -61,12 +58,12 @@ def recorded_person(record: Mapping[str, Any]) -> Mapping[str, Any] | None:
     Raises:
         StoreError: If the entry is malformed.
     """
-    if KEY not in record:
+    if PERSON not in record:
         return None
-    entry = record[KEY]
+    entry = record[PERSON]
     given = entry.get("given") if isinstance(entry, dict) else None
     if not isinstance(given, dict) or not all(isinstance(key, str) for key in given):
-        raise StoreError(f"'{KEY}' must hold what is given of the person under 'given'.")
+        raise StoreError(f"'{PERSON}' must hold what is given of the person under 'given'.")
     return given
 
 

@@ -12,9 +12,8 @@ from tcs.model.scene import LoweredScene, Scene
 from tcs.placement.constraints import recorded_constraints
 from tcs.placement.scoring.hands import digest_of_hands
 from tcs.placement.scoring.job import Job, load_jobs
-from tcs.placement.scoring.person import KEY as PERSON
 from tcs.placement.scoring.person import recorded_person
-from tcs.placement.store import ARMS, ScoreFile, check_scene
+from tcs.placement.store import ARMS, PERSON, ScoreFile, check_scene
 
 _MADE_FROM = ("task", "environment", "robot", "scene_digest")
 

@@ -38,6 +38,12 @@ DESCRIPTIONS = ("metadata", "task", "robot", "environment", "grid", "body_frames
 ARMS = "arms"
 """Entry of the metadata of a file whose goals may be reached by any arm of the robot: "both"."""
 
+PERSON = "person"
+"""Entry of the metadata: what is given of the person, their stature and mass, and the goals at
+which the gripper touches them."""
+OF_BODY = ("stature", "stature_percentile", "mass", "mass_percentile")
+"""Numbers of the entry of a person with a body."""
+
 HANDS = "hands"
 """Entry of the metadata of a file of several hands: of each its arm, tool, goals, description of
 the robot, scene digest and others. A goal may be one of several hands, any of which counts."""
@@ -172,6 +178,11 @@ class ScoreFile:
                 "The file is of an earlier version, in which each configuration used one of "
                 "several arms. Score the task again: any arm may then serve any goal."
             )
+        goals = self.task.get("goals")
+        if isinstance(goals, list) and not all(map(_has_a_frame, goals)):
+            raise StoreError("task needs the 'body_frame' of each goal, of type str.")
+        if PERSON in self.metadata and not _is_person(self.metadata[PERSON]):
+            raise StoreError(f"metadata '{PERSON}' is malformed.")
         self._check_hands()
         self._check_tables()
         records = self.metadata.get("robustness")
@@ -353,6 +364,48 @@ def _check_refined(refined: RefinedTable | None, sets: SetTable, grid: Grid) -> 
         or not np.array_equal(refined.weights, sets.weights)
     ):
         raise StoreError("refined sets that do not belong to the sets of the table.")
+
+
+def _has_a_frame(goal: object) -> bool:
+    """Return whether a goal of the description of a task is unnamed, or names its frame by text."""
+    return not isinstance(goal, dict) or isinstance(goal.get("body_frame", ""), str)
+
+
+def _is_person(entry: object) -> bool:
+    """Return whether the entry of a person can be told in words, and the person be made again."""
+    if not isinstance(entry, dict) or not isinstance(entry.get("given"), dict):
+        return False
+    if not all(isinstance(key, str) for key in entry["given"]):
+        return False
+    if "sex" in entry:
+        numbers = [entry.get(name) for name in OF_BODY] + [entry.get("age", 0)]
+        if entry["sex"] not in ("female", "male") or not all(map(_is_number, numbers)):
+            return False
+    posture = entry.get("posture", {"name": None, "angles_deg": {}})
+    if not isinstance(posture, dict) or not isinstance(posture.get("name", 0), str | None):
+        return False
+    angles, touching = posture.get("angles_deg"), entry.get("touching_goals", [])
+    return (
+        isinstance(angles, dict)
+        and all(isinstance(joint, str) for joint in angles)
+        and all(map(_is_number, angles.values()))
+        and isinstance(touching, list)
+        and all(map(_is_touching_goal, touching))
+    )
+
+
+def _is_touching_goal(entry: object) -> bool:
+    """Return whether an entry names a goal at which the gripper touches a part of the person."""
+    return (
+        isinstance(entry, dict)
+        and type(entry.get("goal")) is int
+        and isinstance(entry.get("part"), str)
+        and isinstance(entry.get("name"), str | None)
+    )
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def _are_numbers(values: object, count: int) -> bool:

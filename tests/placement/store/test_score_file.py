@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tcs.errors import GridError, StoreError, StoreMismatchError
+from tcs.output.words import person_text
 from tcs.placement.store import StateTables, check_scene, load_scores, save_scores
 from tests.placement.store.example import METADATA, SHIFT, score_file
 from tests.placement.tables.small import random_scores, small_grid
@@ -17,6 +18,35 @@ def test_later_changes_outside_do_not_reach_the_file():
     file = score_file(metadata=metadata)
     metadata["task"] = "feeding"
     assert file.metadata["task"] == "shaving"
+
+
+PERSON = {
+    "given": {"sex": "female", "age": 6},
+    "sex": "female",
+    "age": 6,
+    "stature": 1.16,
+    "stature_percentile": 50.0,
+    "mass": 20.5,
+    "mass_percentile": 50,
+    "posture": {"name": None, "angles_deg": {"head_turn": 30}},
+    "touching_goals": [{"goal": 0, "name": None, "part": "person::head"}],
+}
+
+
+@pytest.mark.parametrize("key", PERSON)
+@pytest.mark.parametrize("value", [None, "x", [5], True])
+def test_what_is_recorded_of_the_person_can_be_read(key, value):
+    """Otherwise commands and the service would fail where they say for whom a file is scored."""
+    good = score_file(metadata={**METADATA, "person": PERSON})
+    assert person_text(good.metadata["person"]).startswith("a girl of 6 years")
+    with pytest.raises(StoreError, match="metadata 'person' is malformed"):
+        score_file(metadata={**METADATA, "person": {**PERSON, key: value}})
+
+
+def test_the_frame_of_a_goal_is_text():
+    task = {"name": "shaving", "goals": [{"body_frame": []}] * 5}
+    with pytest.raises(StoreError, match="'body_frame' of each goal"):
+        score_file(task=task)
 
 
 @pytest.mark.parametrize("key", METADATA)
