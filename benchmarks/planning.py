@@ -134,8 +134,8 @@ class Bench:
         """Return a problem, prepared for planning."""
         arrays = self._arrays(problem.obstacles)
         scene = motion_scene(build_problem(arrays), single_row())
-        own = scene.body[scene.pair[:, 1]] >= len(problem.obstacles)
-        needed = np.ones(len(scene.pair), np.bool_)
+        own = scene.shapes.body[scene.pairs.members[:, 1]] >= len(problem.obstacles)
+        needed = np.ones(len(scene.pairs.members), np.bool_)
         if self.needed is None:
             self.needed = needed_pairs(scene, own)[own]
         needed[own] = self.needed
@@ -193,17 +193,17 @@ class Query:
         """Return what excludes start or goal, "" if nothing does."""
         scene = self.scene
         for end in (self.problem.start, self.problem.goal):
-            if np.any(end < scene.lower) or np.any(end > scene.upper):
-                beyond = np.flatnonzero((end < scene.lower) | (end > scene.upper))
+            if np.any(end < scene.limits.lower) or np.any(end > scene.limits.upper):
+                beyond = np.flatnonzero((end < scene.limits.lower) | (end > scene.limits.upper))
                 return f"range of {bench.robot.arm_joints[beyond[0]]}"
             pair = posture_contact(scene, self.work, end)
             if pair != NO_PAIR:
-                return " / ".join(self._body(bench, int(i)) for i in scene.pair[pair, :2])
+                return " / ".join(self._body(bench, int(i)) for i in scene.pairs.members[pair, :2])
         return ""
 
     def _body(self, bench: Bench, shape: int) -> str:
         """Return the name of the body of a shape."""
-        number, obstacles = int(self.scene.body[shape]), self._environment_bodies
+        number, obstacles = int(self.scene.shapes.body[shape]), self._environment_bodies
         return "obstacle" if number < obstacles else bench.lowered.robot_bodies[number - obstacles]
 
     @property
@@ -226,7 +226,7 @@ class Query:
         best = min((self.planned(one) for one in range(seed, seed + seeds)), default=np.nan)
         peers = [(np.nan, np.nan)] * 2
         if roboplan:
-            limits = self.scene.lower, self.scene.upper
+            limits = self.scene.limits.lower, self.scene.limits.upper
             peers = [
                 ompl_path(self.problem, limits, self.is_free, seed),
                 roboplan.path(self.problem, seed),

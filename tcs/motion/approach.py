@@ -104,7 +104,7 @@ class _Search:
         self.line = new_straight_workspace()
         self.outcomes = np.zeros(3, np.int64)
         # Where and how often bodies touch at postures at the goal, and before it.
-        self.at_goal, self.before = np.zeros((2, *stop.line_work.hits.shape), np.int64)
+        self.at_goal, self.before = np.zeros((2, *stop.line_work.contacts.hits.shape), np.int64)
         stop.forget_contacts()
 
     def follow(self, samples: int, *, forwards: bool) -> Iterator[Access]:
@@ -168,7 +168,7 @@ class _Search:
         """Return why nothing was found."""
         if self.outcomes[BLOCKED]:
             return Accesses(
-                (), "approach_blocked", self.stop.most_frequent(self.stop.line_work.hits)
+                (), "approach_blocked", self.stop.most_frequent(self.stop.line_work.contacts.hits)
             )
         if self.outcomes[LIMITS]:
             return Accesses((), "approach_limits", None)
@@ -193,7 +193,7 @@ def joint_time(stop: Stop, start: FloatArray, ends: FloatArray) -> FloatArray:
         start: Joint angles [rad], shape (7,).
         ends: Joint angles [rad], shape (..., 7); joints without limits take the short way.
     """
-    period = stop.motion.period
+    period = stop.motion.limits.period
     angle = ends - start
     turns = np.where(period > 0.0, np.round(angle / np.where(period > 0.0, period, 1.0)), 0.0)
     return np.asarray(np.max(np.abs(angle - turns * period) / stop.velocity, axis=-1))

@@ -7,7 +7,7 @@ import numpy as np
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.motion.connect import connect
 from tcs.kernel.motion.edges import certified
-from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
+from tcs.kernel.motion.scene import ChainLimits, MotionScene, MotionWorkspace
 from tcs.motion.curves import Curve
 from tcs.motion.stops import Stop
 
@@ -49,10 +49,11 @@ def find_path(
     motion = stop.motion
     if not turns:
         # As joints with limits that are half a turn beyond the postures.
-        ends, turning = np.concatenate([starts, goals]), motion.period > 0.0
-        lower = np.where(turning, ends.min(axis=0) - np.pi, motion.lower)
-        upper = np.where(turning, ends.max(axis=0) + np.pi, motion.upper)
-        motion = motion._replace(lower=lower, upper=upper, period=np.zeros(7))
+        ends, turning = np.concatenate([starts, goals]), motion.limits.period > 0.0
+        lower = np.where(turning, ends.min(axis=0) - np.pi, motion.limits.lower)
+        upper = np.where(turning, ends.max(axis=0) + np.pi, motion.limits.upper)
+        limits = ChainLimits(lower, upper, period=np.zeros(7))
+        motion = motion._replace(limits=limits)
     count = connect(motion, stop.work, stop.trees, starts, goals, iterations, SHORTCUTS)
     return (stop.trees.path[:count].copy(), int(stop.trees.ends[1])) if count else None
 
@@ -106,8 +107,11 @@ def is_certified(motion: MotionScene, work: MotionWorkspace, curve: Curve) -> bo
     """
     for piece in range(curve.pieces):
         control = curve.control_points(piece)
-        beyond = np.maximum(motion.lower - control, control - motion.upper) > LIMIT_ROUNDING
-        if np.any(beyond & (motion.period == 0.0)) or certified(motion, work, control) < 1.0:
+        beyond = (
+            np.maximum(motion.limits.lower - control, control - motion.limits.upper)
+            > LIMIT_ROUNDING
+        )
+        if np.any(beyond & (motion.limits.period == 0.0)) or certified(motion, work, control) < 1.0:
             return False
     return True
 

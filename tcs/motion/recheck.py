@@ -120,17 +120,17 @@ def shape_corners(motion: MotionScene, q: FloatArray) -> FloatArray:
     corners = []
 
     def add(link: int, origin: FloatArray) -> None:
-        shapes = motion.links[motion.link_frame == link]
+        shapes = motion.shapes.links[motion.shapes.link_frame == link]
         # Column 1 is the radius of the bounding sphere, columns 2 to 4 are sizes.
         local = (shapes[:, None, 5:8] + shapes[:, None, 1:2] * signs).reshape(-1, 3)
         corners.append(origin[:, None] + local @ R.transpose(0, 2, 1))
 
-    for joint, slide in enumerate(motion.slides):
-        p = p + R @ motion.chain_p[joint, :3]
-        R = R @ motion.chain_R[joint]
+    for joint, slide in enumerate(motion.chain.slides):
+        p = p + R @ motion.chain.p[joint, :3]
+        R = R @ motion.chain.R[joint]
         if slide > 0.0:
             along = slide * q[:, joint, None] * R[:, :, 2]
-            for n, (coupled, part) in enumerate(motion.coupled):
+            for n, (coupled, part) in enumerate(motion.chain.coupled):
                 if coupled == joint:
                     add(FRAMES + n, p + part * along)
             p = p + along

@@ -73,7 +73,7 @@ class _Tour:
 
     def __init__(self, stop: Stop, number: int, jerk: FloatArray) -> None:
         self.stop, self.number = stop, number
-        joints = stop.motion.lower, stop.motion.upper
+        joints = stop.motion.limits.lower, stop.motion.limits.upper
         jerk = in_chain(jerk, np.inf)
         self.limits = MotionLimits(stop.velocity, stop.acceleration, jerk, *joints)
         self.found: dict[int, Accesses] = {}

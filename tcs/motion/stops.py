@@ -166,7 +166,7 @@ class StopGrid:
         Pairs of the robot's own shapes that never touch are left out.
         """
         every, robot = torso_scene(self.problem, torso), self.problem.environment.bodies
-        other = every.body[every.pair[:, 1]]
+        other = every.shapes.body[every.pairs.members[:, 1]]
         kept = needed_pairs(every, other >= robot)
         of_fixed = carriers(self.problem)
         paths = grouped(with_pairs(every, kept), of_fixed)
@@ -311,7 +311,9 @@ class Stop:
 
     def bodies(self, motion: MotionScene, pair: int) -> BodyPair:
         """Return the names of the bodies of a pair of shapes of one of the two scenes."""
-        first, second = (self._names[int(motion.body[i])] for i in motion.pair[pair, :2])
+        first, second = (
+            self._names[int(motion.shapes.body[i])] for i in motion.pairs.members[pair, :2]
+        )
         return first, second
 
     @property
@@ -322,17 +324,17 @@ class Stop:
 
     def forget_contacts(self) -> None:
         """Start counting anew which pairs block edges and straight motions."""
-        self.work.hits[:] = self.line_work.hits[:] = 0
+        self.work.contacts.hits[:] = self.line_work.contacts.hits[:] = 0
 
     def most_frequent_contact(self) -> BodyPair | None:
         """Return the pair of bodies that blocked most edges since `forget_contacts`."""
-        return self.most_frequent(self.work.hits)
+        return self.most_frequent(self.work.contacts.hits)
 
     def most_frequent(self, contacts: IntArray) -> BodyPair | None:
         """Return the pair of bodies with the most contacts, None if there are none.
 
         Args:
-            contacts: Numbers of contacts, shape as that of `MotionWorkspace.hits`.
+            contacts: Numbers of contacts, shape as that of `FoundContacts.hits`.
         """
         if not np.any(contacts):
             return None

@@ -30,8 +30,8 @@ def tool_slowing(scene: MotionScene, motion: Curve) -> float:
     q, dq = _samples(motion, np.sqrt(third / (8.0 * missed)))
     _, p, axes, origins = _tool(scene, q)
     arms = np.cross(axes, p[:, None] - origins)
-    sliding = scene.slides > 0.0
-    arms[:, sliding] = scene.slides[sliding, None] * axes[:, sliding]
+    sliding = scene.chain.slides > 0.0
+    arms[:, sliding] = scene.chain.slides[sliding, None] * axes[:, sliding]
     speed = np.linalg.norm(np.einsum("nk,nkr->nr", dq, arms), axis=1)
     return float(np.max(speed) + missed) / TOOL_SPEED
 
@@ -53,8 +53,8 @@ def is_straight(scene: MotionScene, motion: Curve) -> bool:
     from_begin = p - p[0]
     off = np.linalg.norm(from_begin - np.outer(from_begin @ line, line), axis=1)
     turned = np.linalg.norm(R - R[0], axis=(1, 2)) / np.sqrt(2.0)
-    if np.any(scene.turn):
-        turned = np.linalg.norm((R - R[0]) @ scene.turn, axis=1)
+    if np.any(scene.chain.free_axis):
+        turned = np.linalg.norm((R - R[0]) @ scene.chain.free_axis, axis=1)
     return bool(max(np.max(off), np.max(turned)) + missed <= OFF_LINE)
 
 
@@ -89,10 +89,10 @@ def _greatest_derivatives(
         orientation, as rotation vectors [rad/s^2].
     """
     velocity, acceleration, jerk = rates(motion)
-    links = np.linalg.norm(scene.chain_p[1:, :3], axis=1)
-    sliding = scene.slides > 0.0
-    farthest = np.maximum(np.abs(scene.lower), np.abs(scene.upper))[sliding]
-    links[sliding] += scene.slides[sliding] * farthest
+    links = np.linalg.norm(scene.chain.p[1:, :3], axis=1)
+    sliding = scene.chain.slides > 0.0
+    farthest = np.maximum(np.abs(scene.limits.lower), np.abs(scene.limits.upper))[sliding]
+    links[sliding] += scene.chain.slides[sliding] * farthest
     for rate in (velocity, acceleration, jerk):
         rate[:, sliding] /= farthest
     # From the origin of each joint to the tool with the arm stretched.
@@ -124,15 +124,15 @@ def _tool(
     R, p = np.repeat(np.eye(3)[None], len(q), axis=0), np.zeros((len(q), 3))
     axes, origins = np.empty((len(q), 7, 3)), np.empty((len(q), 7, 3))
     for k in range(7):
-        p = p + R @ scene.chain_p[k, :3]
-        R = R @ scene.chain_R[k]
+        p = p + R @ scene.chain.p[k, :3]
+        R = R @ scene.chain.R[k]
         axes[:, k], origins[:, k] = R[:, :, 2], p
-        if scene.slides[k] > 0.0:
-            p = p + scene.slides[k] * q[:, k, None] * R[:, :, 2]
+        if scene.chain.slides[k] > 0.0:
+            p = p + scene.chain.slides[k] * q[:, k, None] * R[:, :, 2]
             continue
         turn = np.zeros((len(q), 3, 3))
         c, s = np.cos(q[:, k]), np.sin(q[:, k])
         turn[:, 0, 0], turn[:, 0, 1], turn[:, 1, 0], turn[:, 1, 1] = c, -s, s, c
         turn[:, 2, 2] = 1.0
         R = R @ turn
-    return R @ scene.chain_R[7], p + R @ scene.chain_p[7, :3], axes, origins
+    return R @ scene.chain.R[7], p + R @ scene.chain.p[7, :3], axes, origins

@@ -47,7 +47,7 @@ def test_the_arm_goes_from_rest_straight_in_and_out_and_back(planned, stop):
 
 def test_the_motion_back_to_rest_takes_full_turns_back(stop):
     tour = _Tour(stop, 0, np.full(7, np.inf))
-    turns = np.where(stop.motion.period > 0.0, 2.0 * np.pi, 0.0)
+    turns = np.where(stop.motion.limits.period > 0.0, 2.0 * np.pi, 0.0)
     tour.q, tour.goal = stop.rest + turns, 0
     assert (np.count_nonzero(turns), tour.go_home()) == (2, True)
     (home,) = tour.segments

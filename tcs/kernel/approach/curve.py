@@ -199,10 +199,10 @@ def spline_is_free(scene: MotionScene, motion: MotionWorkspace, curve: CurveWork
     take_pieces(motion, points, tangents, FIRST, pieces)
     if curve_is_free(scene, motion, True):
         return True
-    curve.blocked[0] = _level_after(motion.met[0])
-    curve.blocked[1] = motion.contact[0]
+    curve.blocked[0] = _level_after(motion.contacts.met[0])
+    curve.blocked[1] = motion.contacts.pair[0]
     n = curve.probes[0] % PROBES
-    curve.probe[n], curve.probe_pair[n] = motion.met[0], motion.contact[0]
+    curve.probe[n], curve.probe_pair[n] = motion.contacts.met[0], motion.contacts.pair[0]
     curve.probes[0] += 1
     return False
 
@@ -239,7 +239,9 @@ def path_touches(
             grid.p_AT[r] = curve.line.p_AT[r] + fraction * offset[r]
         wrist_goal(arm, curve.line.R_AT, grid.p_AT, curve.goal)
         angle, _ = _path_at(grid, fraction)
-        place_sample(arm, curve.goal, arm.branches[b], angle, motion.q, motion.turns)
+        place_sample(
+            arm, curve.goal, arm.branches[b], angle, motion.posture.q, motion.posture.turns
+        )
         take_turned_posture(scene, motion)
         if is_near(scene, motion, k, False):
             curve.blocked[0], curve.blocked[1] = _level_after(fraction), k
@@ -303,9 +305,9 @@ def _fill_points(
         place_sample(arm, curve.goal, arm.branches[b], angle, q, line.turns)
         if n > 0:
             for k in range(7):
-                if scene.period[k] > 0.0:
-                    turns = np.floor((q[k] - points[n - 1, k]) / scene.period[k] + 0.5)
-                    q[k] -= turns * scene.period[k]
+                if scene.limits.period[k] > 0.0:
+                    turns = np.floor((q[k] - points[n - 1, k]) / scene.limits.period[k] + 0.5)
+                    q[k] -= turns * scene.limits.period[k]
             if is_too_fast(points, n, pieces, fastest):
                 return False
         if evaluate_on_line(scene, line, q) > AT_POINT:

@@ -113,7 +113,10 @@ def _fill_spline(problem: Problem, approach: Approach, fastest: FloatArray, b: i
 @inner
 def _is_of_gripper(scene: MotionScene, k: int) -> bool:
     """Return whether a pair is of the gripper and something fixed, the same from every posture."""
-    return scene.pair[k, 2] == 0 and scene.link_frame[scene.pair[k, 0]] == GRIPPER
+    return (
+        scene.pairs.members[k, 2] == 0
+        and scene.shapes.link_frame[scene.pairs.members[k, 0]] == GRIPPER
+    )
 
 
 @inner
@@ -155,7 +158,9 @@ def _take_node(problem: Problem, approach: Approach, b: int, i: int, level: int)
     """Take the posture of a node of the grid; no joint moves."""
     arm, grid, motion = problem.arm, approach.grid, approach.motion
     angle = grid.origin[0] + i * grid.origin[1]
-    place_sample(arm, grid.goal[level], arm.branches[b], angle, motion.q, motion.turns)
+    place_sample(
+        arm, grid.goal[level], arm.branches[b], angle, motion.posture.q, motion.posture.turns
+    )
     take_turned_posture(approach.scene, motion)
 
 
@@ -193,4 +198,4 @@ def contact_at(problem: Problem, approach: Approach, b: int, i: int, level: int)
     _take_node(problem, approach, b, i, level)
     if is_placed_free(approach.scene, approach.motion):
         return NO_PAIR
-    return approach.motion.contact[0]
+    return approach.motion.contacts.pair[0]

@@ -127,7 +127,9 @@ def _lead_through(
         level: Its level.
     """
     arm, grid, search = problem.arm, approach.grid, approach.search
-    place_sample(arm, grid.goal[level], arm.branches[b], angle, search.q, approach.motion.turns)
+    place_sample(
+        arm, grid.goal[level], arm.branches[b], angle, search.q, approach.motion.posture.turns
+    )
     if lead_from(problem, approach, fastest, level * PER_LEVEL, search.q) != DONE:
         return False
     for k in range(7):

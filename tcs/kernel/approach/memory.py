@@ -80,7 +80,8 @@ AnyApproach = Approach | ListedApproach[Any]
 
 def new_approach(problem: Problem, lines: LineScene) -> AnyApproach:
     """Return the memory of one worker, given the `approach_scene` of the problem."""
-    scene = lines.motion._replace(centre=lines.motion.centre.copy())
+    pairs = lines.motion.pairs
+    scene = lines.motion._replace(pairs=pairs._replace(centre=pairs.centre.copy()))
     solver = new_solver(problem)
     if not isinstance(solver, Search):
         return ListedApproach(

@@ -54,22 +54,25 @@ def approach_scene(problem: Problem) -> LineScene:
     Pairs of the robot's own shapes that touch at no torso level are left out.
     """
     first = torso_scene(problem, 0)
-    needed = needed_pairs(first, first.body[first.pair[:, 1]] >= problem.environment.bodies)
+    needed = needed_pairs(
+        first, first.shapes.body[first.pairs.members[:, 1]] >= problem.environment.bodies
+    )
     apart = _is_apart_from_torso(problem, first)
     for torso in range(1, len(problem.arm_base.R)):
         left = ~needed & apart
         if np.any(left):
-            fixed = first.fixed.copy()
+            fixed = first.shapes.fixed.copy()
             bodies = len(problem.body.body)
             fixed[problem.environment.body.size :] = problem.body.shapes_A[torso, :bodies]
-            some = with_pairs(first._replace(fixed=fixed), left)
-            needed[left] = needed_pairs(some, np.ones(len(some.pair), np.bool_))
+            elsewhere = first._replace(shapes=first.shapes._replace(fixed=fixed))
+            some = with_pairs(elsewhere, left)
+            needed[left] = needed_pairs(some, np.ones(len(some.pairs.members), np.bool_))
     scene = grouped(with_pairs(first, needed), carriers(problem))
     of_robot = np.concatenate(
         [problem.body.shapes_A[:, : len(problem.body.body)], _boxes(problem, scene)], axis=1
     )
     moving = np.flatnonzero(_is_moved(of_robot))
-    first_shape = len(scene.links) + problem.environment.body.size
+    first_shape = len(scene.shapes.links) + problem.environment.body.size
     return LineScene(scene, first_shape + moving, np.ascontiguousarray(of_robot[:, moving]))
 
 
@@ -81,7 +84,7 @@ def _is_apart_from_torso(problem: Problem, scene: MotionScene) -> BoolArray:
         scene: A scene of it without groups; the result has shape (n_pairs,).
     """
     moved = np.append(_is_moved(problem.body.shapes_A), False)
-    shape = scene.pair[:, 1] - len(scene.links) - problem.environment.body.size
+    shape = scene.pairs.members[:, 1] - len(scene.shapes.links) - problem.environment.body.size
     found: BoolArray = moved[np.where(shape >= 0, shape, -1)]
     return found
 
@@ -95,8 +98,8 @@ def _is_moved(rows: FloatArray) -> BoolArray:
 def _boxes(problem: Problem, scene: MotionScene) -> FloatArray:
     """Return the boxes around groups of fixed shapes in A, shape (torso levels, n_boxes, 17)."""
     shapes = problem.environment.body.size + problem.body.body.size
-    boxes = scene.fixed[shapes:]
-    bodies = scene.body[len(scene.links) + shapes :] - problem.environment.bodies
+    boxes = scene.shapes.fixed[shapes:]
+    bodies = scene.shapes.body[len(scene.shapes.links) + shapes :] - problem.environment.bodies
     first = [int(np.argmax(problem.body.body == body)) for body in bodies]
     on_base = problem.body.mount[np.array(first, np.int64)] == BASE_FIXED
     every = np.repeat(boxes[None], len(problem.arm_base.R), axis=0)
@@ -128,8 +131,8 @@ def place_scene(
         moved: As in `LineScene`.
         motion: Its shapes are filled.
     """
-    environment, shapes = work.environment_A, motion.shapes
-    at = len(scene.links)
+    environment, shapes = work.environment_A, motion.posture.shapes
+    at = len(scene.shapes.links)
     for j in range(len(environment)):
         for r in range(3):
             shapes[at + j, CENTRE + r] = AWAY
@@ -140,8 +143,8 @@ def place_scene(
     for n in range(len(moving)):
         for c in range(COLUMNS):
             shapes[moving[n], c] = moved[torso, n, c]
-    pair, centre = scene.pair, scene.centre
-    for k in range(scene.first_pair[-1]):
+    pair, centre = scene.pairs.members, scene.pairs.centre
+    for k in range(scene.pairs.first[-1]):
         if pair[k, 2] == 0:
             for r in range(3):
                 centre[r, k] = shapes[pair[k, 1], CENTRE + r]
@@ -151,4 +154,7 @@ def place_scene(
 def pair_contact_code(problem: Problem, scene: MotionScene, k: int) -> int:
     """Return the contact code, as in `tcs.kernel.contacts`, of pair k of the scene."""
     bodies = problem.environment.bodies + problem.robot_bodies
-    return problem.links.body[scene.pair[k, 0]] * bodies + scene.body[scene.pair[k, 1]]
+    return (
+        problem.links.body[scene.pairs.members[k, 0]] * bodies
+        + scene.shapes.body[scene.pairs.members[k, 1]]
+    )

@@ -145,7 +145,7 @@ def _place_goal(
     work = approach.work
     goal_in_arm_base(problem, work, state, torso, g)
     # No result may depend on the pairs before, whose shapes are no longer in place.
-    approach.motion.contact[0] = NO_PAIR
+    approach.motion.contacts.pair[0] = NO_PAIR
     for r in range(3):
         approach.offset[r] = 0.0
         for c in range(3):

@@ -75,7 +75,7 @@ def connect(
 
     Args:
         owned_scene: The scene.
-        owned_work: Scratch; `hits` counts which bodies blocked an edge.
+        owned_work: Scratch; `contacts.hits` counts which bodies blocked an edge.
         owned_trees: Holds the random state; `path` and `ends` are filled. Joints without limits
             may end full turns away from the goal.
         starts: Postures at which nothing touches [rad], shape (n, 7).
@@ -179,14 +179,15 @@ def _draw_target(scene: MotionScene, trees: Trees, side: int, beyond: float) -> 
         side: The tree.
         beyond: How far beyond its limits a joint is drawn, as a fraction of its range.
     """
+    limits = scene.limits
     target, q = trees.target[0], trees.q[side]
     local = uniform(trees.random) < LOCAL
     root = uniform(trees.random)
     scale = SPREAD * root * root
     n = int(uniform(trees.random) * trees.nodes[side])
     for k in range(7):
-        low, high = scene.lower[k], scene.upper[k]
-        if scene.period[k] > 0.0:
+        low, high = limits.lower[k], limits.upper[k]
+        if limits.period[k] > 0.0:
             low, high = -np.pi, np.pi
         first = uniform(trees.random)
         target[k] = low + (high - low) * (first * (1.0 + 2.0 * beyond) - beyond)
@@ -194,7 +195,7 @@ def _draw_target(scene: MotionScene, trees: Trees, side: int, beyond: float) -> 
             # The sum of three is close to normal, with a standard deviation of 0.5.
             about = first + uniform(trees.random) + uniform(trees.random) - 1.5
             target[k] = q[n, k] + scale * about
-        if scene.period[k] == 0.0:
+        if limits.period[k] == 0.0:
             target[k] = min(max(target[k], low), high)
 
 
@@ -295,10 +296,10 @@ def _grow(
     fraction = part if d <= STEP else part * STEP / d
     for k in range(7):
         angle = difference(scene, q[n, k], target[k], k)
-        reached = fraction == 1.0 and scene.period[k] == 0.0
+        reached = fraction == 1.0 and scene.limits.period[k] == 0.0
         q[new, k] = target[k] if reached else q[n, k] + fraction * angle
     if not posture_is_free(scene, work, q[new]):
-        count_hit(scene, work, work.contact[0])
+        count_hit(scene, work, work.contacts.pair[0])
         count_blocked(trees, side, n)
         return NONE
     if not edge_seems_free(scene, work, q[n], q[new]):

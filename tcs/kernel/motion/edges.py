@@ -45,20 +45,20 @@ certified: most edges that are blocked are so at one of them."""
 
 @inner
 def posture_is_free(scene: MotionScene, work: MotionWorkspace, q: FloatArray) -> bool:
-    """Return whether nothing touches at joint angles q; fills `contact` if something does."""
+    """Return whether nothing touches at joint angles q; fills `contacts.pair` if something does."""
     for k in range(7):
-        work.q[k] = q[k]
+        work.posture.q[k] = q[k]
     return is_free_here(scene, work)
 
 
 @inner
 def is_free_here(scene: MotionScene, work: MotionWorkspace) -> bool:
-    """Return whether nothing touches at `work.q`; fills `contact` if something does.
+    """Return whether nothing touches at `posture.q`; fills `contacts.pair` if something does.
 
     The last pair in contact is checked first.
     """
     for k in range(7):
-        work.delta[k] = 0.0
+        work.piece.delta[k] = 0.0
     take_posture(scene, work)
     return is_placed_free(scene, work)
 
@@ -66,13 +66,13 @@ def is_free_here(scene: MotionScene, work: MotionWorkspace) -> bool:
 @inner
 def is_placed_free(scene: MotionScene, work: MotionWorkspace) -> bool:
     """Do as `is_free_here` where the posture is taken, and no joint moves."""
-    last = work.contact[0]
+    last = work.contacts.pair[0]
     if last >= 0 and is_near(scene, work, last, False):
         return False
     found = contact_here(scene, work)
     if found == NO_PAIR:
         return True
-    work.contact[0] = found
+    work.contacts.pair[0] = found
     return False
 
 
@@ -80,7 +80,7 @@ def is_placed_free(scene: MotionScene, work: MotionWorkspace) -> bool:
 def posture_contact(owned_scene: MotionScene, owned_work: MotionWorkspace, q: FloatArray) -> int:
     """Return a pair in contact at joint angles q [rad], shape (7,), or NO_PAIR."""
     scene, work = unowned(owned_scene), unowned(owned_work)
-    return NO_PAIR if posture_is_free(scene, work, q) else work.contact[0]
+    return NO_PAIR if posture_is_free(scene, work, q) else work.contacts.pair[0]
 
 
 @jit
@@ -89,16 +89,16 @@ def certified(owned_scene: MotionScene, owned_work: MotionWorkspace, control: Fl
 
     Args:
         owned_scene: The scene.
-        owned_work: Scratch; where the result is below 1, `contact` is the pair that blocks it
+        owned_work: Scratch; where the result is below 1, `contacts.pair` is the pair that blocks it
             there.
         control: Control points of the cubic Bezier curve [rad], shape (4, 7).
     """
     scene, work = unowned(owned_scene), unowned(owned_work)
-    work.pieces[0] = 1
+    work.curve.pieces[0] = 1
     for m in range(4):
         for k in range(7):
-            work.control[m, k] = control[m, k]
-    return 1.0 if curve_is_free(scene, work, False) else work.met[0]
+            work.curve.control[m, k] = control[m, k]
+    return 1.0 if curve_is_free(scene, work, False) else work.contacts.met[0]
 
 
 @inner
@@ -116,7 +116,7 @@ def edge_seems_free(
     """Return whether nothing touches at postures between the two ends of a straight edge [rad]."""
     moved = 0.0
     for k in range(7):
-        moved += abs(end[k] - start[k]) * scene.reach[k]
+        moved += abs(end[k] - start[k]) * scene.chain.reach[k]
     parts = max(int(np.ceil(moved / SPACING)), 1)
     stride = max(int(GOLDEN * parts + 0.5), 1)
     while not _are_coprime(stride, parts):
@@ -125,9 +125,9 @@ def edge_seems_free(
     for _ in range(parts):
         if n > 0:
             for k in range(7):
-                work.q[k] = start[k] + (end[k] - start[k]) * (n / parts)
+                work.posture.q[k] = start[k] + (end[k] - start[k]) * (n / parts)
             if not is_free_here(scene, work):
-                count_hit(scene, work, work.contact[0])
+                count_hit(scene, work, work.contacts.pair[0])
                 return False
         n = (n + stride) % parts
     return True
@@ -146,8 +146,8 @@ def edge_is_certified(
     scene: MotionScene, work: MotionWorkspace, start: FloatArray, end: FloatArray
 ) -> bool:
     """Return whether the straight edge between two postures [rad] is certified."""
-    control = work.control
-    work.pieces[0] = 1
+    control = work.curve.control
+    work.curve.pieces[0] = 1
     for k in range(7):
         step = end[k] - start[k]
         control[0, k], control[3, k] = start[k], end[k]
@@ -157,7 +157,7 @@ def edge_is_certified(
 
 @inner
 def curve_is_free(scene: MotionScene, work: MotionWorkspace, at_end: bool) -> bool:
-    """Return whether the curve `work.control` is certified; else `contact` blocks it, at `met`.
+    """Return whether `work.curve` is certified; else `contacts.pair` blocks it, at `contacts.met`.
 
     Args:
         scene: The scene.
@@ -168,15 +168,15 @@ def curve_is_free(scene: MotionScene, work: MotionWorkspace, at_end: bool) -> bo
     take_middle(work, 0.0, 1.0)
     moved = 0.0
     for k in range(7):
-        moved += work.delta[k] * scene.reach[k]
+        moved += work.piece.delta[k] * scene.chain.reach[k]
     # A curve of several pieces is halved as they are.
-    parts = min(FIRST_PARTS, work.pieces[0])
-    if work.pieces[0] == 1 and moved > PIECE:
+    parts = min(FIRST_PARTS, work.curve.pieces[0])
+    if work.curve.pieces[0] == 1 and moved > PIECE:
         parts = int(np.ceil(moved / PIECE))
     for n in range(parts):
         begin, end = n / parts, (n + 1) / parts
         _take_piece(scene, work, begin, end)
-        count = list_near(scene, work, ROUNDING, len(scene.pair))
+        count = list_near(scene, work, ROUNDING, len(scene.pairs.members))
         if not _listed_are_free(scene, work, count, begin, end, at_end and n == parts - 1):
             return False
     return True
@@ -186,12 +186,12 @@ def curve_is_free(scene: MotionScene, work: MotionWorkspace, at_end: bool) -> bo
 def _listed_are_free(
     scene: MotionScene, work: MotionWorkspace, count: int, begin: float, end: float, at_end: bool
 ) -> bool:
-    """Return whether a piece of `work.control` is certified for listed pairs.
+    """Return whether a piece of `work.curve` is certified for listed pairs.
 
     Args:
         scene: The scene.
         work: Holds the curve, and as current posture the middle of the piece; the first pairs in
-            `pairs` are checked.
+            `uncertified.pairs` are checked.
         count: Number of pairs.
         begin: Begin of the piece, in [0, 1].
         end: End of the piece.
@@ -211,9 +211,9 @@ def _listed_are_free(
 
 @inner
 def _listed_touch(scene: MotionScene, work: MotionWorkspace, count: int, at: float) -> bool:
-    """Return whether one of the first pairs in `pairs` is in contact at the current posture."""
+    """Return whether one of the first listed pairs is in contact at the current posture."""
     for m in range(count):
-        k = work.pairs[m]
+        k = work.uncertified.pairs[m]
         if not is_of_groups(scene, k) and is_near(scene, work, k, False):
             _block(scene, work, k, at)
             return True
@@ -223,7 +223,7 @@ def _listed_touch(scene: MotionScene, work: MotionWorkspace, count: int, at: flo
 @inner
 def _block(scene: MotionScene, work: MotionWorkspace, k: int, at: float) -> None:
     """Record that pair k blocks the curve."""
-    work.contact[0], work.met[0] = k, at
+    work.contacts.pair[0], work.contacts.met[0] = k, at
     count_hit(scene, work, k)
 
 
@@ -231,19 +231,20 @@ def _block(scene: MotionScene, work: MotionWorkspace, k: int, at: float) -> None
 def _halves_are_free(
     scene: MotionScene, work: MotionWorkspace, count: int, begin: float, end: float
 ) -> bool:
-    """Return whether both halves of a piece of `work.control` are certified.
+    """Return whether both halves of a piece of `work.curve` are certified.
 
     Pieces are divided level by level, so that a contact is met on the longest pieces that show it;
     depth first once memory is short.
 
     Args:
         scene: The scene.
-        work: Holds the curve; the first pairs in `pairs` are checked.
+        work: Holds the curve; the first pairs in `uncertified.pairs` are checked.
         count: Number of pairs.
         begin: Begin of the piece, in [0, 1].
         end: End of the piece.
     """
-    span, stretch, most = work.span, work.stretch, len(work.span)
+    uncertified = work.uncertified
+    span, stretch, most = uncertified.span, uncertified.stretch, len(uncertified.span)
     _push_halves(work, 0, begin, end, 0, count)
     head, top, used = 0, 2, count
     while head < top:
@@ -256,7 +257,7 @@ def _halves_are_free(
         begin, end = span[n, 0], span[n, 1]
         left = _uncertified(scene, work, begin, end, stretch[n, 0], stretch[n, 1], used)
         if left < 0 or (left > 0 and top + 2 > most):
-            _block(scene, work, work.contact[0], 0.5 * (begin + end))
+            _block(scene, work, work.contacts.pair[0], 0.5 * (begin + end))
             return False
         if left > 0:
             _push_halves(work, top, begin, end, used, used + left)
@@ -269,7 +270,7 @@ def _push_halves(
     work: MotionWorkspace, top: int, begin: float, end: float, first: int, last: int
 ) -> None:
     """Append both halves of a piece to those to certify, with the pairs to check on them."""
-    span, stretch, middle = work.span, work.stretch, 0.5 * (begin + end)
+    span, stretch, middle = work.uncertified.span, work.uncertified.stretch, 0.5 * (begin + end)
     span[top, 0], span[top, 1] = begin, middle
     span[top + 1, 0], span[top + 1, 1] = middle, end
     for n in range(2):
@@ -290,8 +291,8 @@ def _uncertified(
 
     Args:
         scene: The scene.
-        work: Holds the curve; `pairs[first:last]` are the pairs to check. Those not certified are
-            listed from `pairs[to]` on.
+        work: Holds the curve; `uncertified.pairs[first:last]` are the pairs to check. Those not
+            certified are listed from `uncertified.pairs[to]` on.
         begin: Begin of the piece, in [0, 1].
         end: End of the piece.
         first: First pair.
@@ -301,21 +302,22 @@ def _uncertified(
     Returns:
         Number of pairs not certified, or -1 where one is in contact, or moves less than RESOLUTION.
     """
+    uncertified, pairs = work.uncertified, scene.pairs
     _take_piece(scene, work, begin, end)
     left = 0
     for n in range(first, last):
-        k = work.pairs[n]
+        k = uncertified.pairs[n]
         if not is_near_on_piece(scene, work, k):
             continue
-        moved, before = work.motion[scene.pair[k, 0], scene.pair[k, 2]], to + left
-        left = append_below(scene, work, k, moved, ROUNDING, before, len(work.pairs)) - to
+        moved, before = work.piece.motion[pairs.members[k, 0], pairs.members[k, 2]], to + left
+        left = append_below(scene, work, k, moved, ROUNDING, before, len(uncertified.pairs)) - to
         for m in range(before, to + left):
-            k = work.pairs[m]
+            k = uncertified.pairs[m]
             if is_of_groups(scene, k):
                 continue
-            moved = work.motion[scene.pair[k, 0], scene.pair[k, 2]]
+            moved = work.piece.motion[pairs.members[k, 0], pairs.members[k, 2]]
             if moved < RESOLUTION or is_near(scene, work, k, False):
-                work.contact[0] = k
+                work.contacts.pair[0] = k
                 return -1
     return left
 
@@ -331,7 +333,8 @@ def _take_piece(scene: MotionScene, work: MotionWorkspace, begin: float, end: fl
 @inner
 def take_middle(work: MotionWorkspace, begin: float, end: float) -> None:
     """Fill the posture in the middle of a part of the curve, and how far each joint is from it."""
-    control, pieces = work.control, work.pieces[0]
+    piece = work.piece
+    control, pieces = work.curve.control, work.curve.pieces[0]
     first, last = begin * pieces, end * pieces
     if last - first > 1.0:
         _take_middle_of_pieces(work, int(first), int(last))
@@ -342,11 +345,11 @@ def take_middle(work: MotionWorkspace, begin: float, end: float) -> None:
     for k in range(7):
         a, b = control[at, k], control[at + 1, k]
         c, d = control[at + 2, k], control[at + 3, k]
-        work.q[k] = u * u * (u * a + 3.0 * t * b) + t * t * (3.0 * u * c + t * d)
+        work.posture.q[k] = u * u * (u * a + 3.0 * t * b) + t * t * (3.0 * u * c + t * d)
         # The derivatives of the curve lie between multiples of the differences of its points.
-        work.delta[k] = 3.0 * half * max(abs(b - a), abs(c - b), abs(d - c))
-        work.rate[k] = 3.0 * half * (u * u * (b - a) + 2.0 * u * t * (c - b) + t * t * (d - c))
-        work.bend[k] = 6.0 * half * half * max(abs(a - 2.0 * b + c), abs(b - 2.0 * c + d))
+        piece.delta[k] = 3.0 * half * max(abs(b - a), abs(c - b), abs(d - c))
+        piece.rate[k] = 3.0 * half * (u * u * (b - a) + 2.0 * u * t * (c - b) + t * t * (d - c))
+        piece.bend[k] = 6.0 * half * half * max(abs(a - 2.0 * b + c), abs(b - 2.0 * c + d))
 
 
 @inner
@@ -361,7 +364,8 @@ def _take_middle_of_pieces(work: MotionWorkspace, first: int, last: int) -> None
         first: Number of the first piece.
         last: One after the last piece.
     """
-    control, middle = work.control, 3 * ((first + last) // 2)
+    piece = work.piece
+    control, middle = work.curve.control, 3 * ((first + last) // 2)
     scale = 2.0 / (3.0 * (last - first))
     for k in range(7):
         q = control[middle, k]
@@ -371,4 +375,9 @@ def _take_middle_of_pieces(work: MotionWorkspace, first: int, last: int) -> None
             along = control[m, k] - q
             delta = max(delta, abs(along))
             beyond = max(beyond, abs(along - rate * scale * (m - middle)))
-        work.q[k], work.delta[k], work.rate[k], work.bend[k] = q, delta, rate, 2.0 * beyond
+        work.posture.q[k], piece.delta[k], piece.rate[k], piece.bend[k] = (
+            q,
+            delta,
+            rate,
+            2.0 * beyond,
+        )

@@ -17,18 +17,15 @@ def take_frames(scene: MotionScene, work: MotionWorkspace, i: int, j: int) -> No
 
     Args:
         scene: The scene.
-        work: Scratch, with the current posture; `between` is filled.
+        work: Scratch, with the current posture; `separation.between` is filled.
         i: A box around shapes of a link.
         j: A box around fixed shapes.
     """
-    frame, between, shapes = scene.link_frame[i], work.between, work.shapes
-    R, p = work.link_R[frame], work.link_p[frame]
+    posture = work.posture
+    frame, between, shapes = scene.shapes.link_frame[i], work.separation.between, posture.shapes
+    R, p = posture.link_R[frame], posture.link_p[frame]
     for m in range(3):
-        a, b, c = (
-            shapes[j, ROTATION + m],
-            shapes[j, ROTATION + 3 + m],
-            shapes[j, ROTATION + 6 + m],
-        )
+        a, b, c = shapes[j, ROTATION + m], shapes[j, ROTATION + 3 + m], shapes[j, ROTATION + 6 + m]
         for n in range(3):
             between[m, n] = a * R[0, n] + b * R[1, n] + c * R[2, n]
         between[m, 3] = a * p[0] + b * p[1] + c * p[2]
@@ -46,7 +43,7 @@ def boxes_apart(scene: MotionScene, work: MotionWorkspace, i: int, j: int, apart
         j: A box around fixed shapes of the carrier.
         apart: The distance [m].
     """
-    links, shapes, between = scene.links, work.shapes, work.between
+    links, shapes, between = scene.shapes.links, work.posture.shapes, work.separation.between
     u, v, w = links[i, CENTRE], links[i, CENTRE + 1], links[i, CENTRE + 2]
     a, b, c = shapes[j, CENTRE], shapes[j, CENTRE + 1], shapes[j, CENTRE + 2]
     hx, hy, hz = links[i, SIZE], links[i, SIZE + 1], links[i, SIZE + 2]

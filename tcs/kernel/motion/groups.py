@@ -16,7 +16,7 @@ from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.collide import BOUND, CENTRE
 from tcs.kernel.motion.box_tree import NONE, Groups, boxes_around
 from tcs.kernel.motion.pair_tree import PairTree, pair_tree
-from tcs.kernel.motion.scene import NO_PAIR, MotionScene, depth, pair_fields
+from tcs.kernel.motion.scene import NO_PAIR, LeafSpheres, MotionScene, depth, shape_pairs
 
 
 def grouped(scene: MotionScene, carrier: IntArray | None = None) -> MotionScene:
@@ -27,19 +27,22 @@ def grouped(scene: MotionScene, carrier: IntArray | None = None) -> MotionScene:
         carrier: Number of what carries each fixed shape, NONE for shapes that are not grouped,
             shape (n_fixed,); None to group none. Boxes come after the fixed shapes.
     """
-    count, shapes = len(scene.links), len(scene.fixed)
-    arm = boxes_around(scene.links, scene.link_frame, scene.body[:count])
+    count, shapes = len(scene.shapes.links), len(scene.shapes.fixed)
+    arm = boxes_around(scene.shapes.links, scene.shapes.link_frame, scene.shapes.body[:count])
     carrier = np.full(shapes, NONE) if carrier is None else carrier
-    around = boxes_around(scene.fixed, carrier, scene.body[count:])
+    around = boxes_around(scene.shapes.fixed, carrier, scene.shapes.body[count:])
     added = len(arm.rows) - count
     if added == 0 and len(around.rows) == shapes:
         return scene
     gap = np.zeros((count, len(arm.rows) + shapes))
-    gap[scene.pair[:, 0], scene.pair[:, 1] + added * (scene.pair[:, 1] >= count)] = scene.gap
+    gap[
+        scene.pairs.members[:, 0],
+        scene.pairs.members[:, 1] + added * (scene.pairs.members[:, 1] >= count),
+    ] = scene.pairs.gap
     frame = np.concatenate([arm.frame, np.zeros(len(around.rows), np.int64)])
-    tree, roots = _pairs(arm, around, depth(frame, scene.coupled), gap)
+    tree, roots = _pairs(arm, around, depth(frame, scene.chain.coupled), gap)
     first, second = tree.first, tree.second
-    fields = pair_fields(
+    pairs = shape_pairs(
         arm.rows,
         around.rows,
         np.stack([first, second, frame[second]], axis=1),
@@ -47,7 +50,7 @@ def grouped(scene: MotionScene, carrier: IntArray | None = None) -> MotionScene:
         tree.below,
         roots,
     )
-    bodies = (_bodies(arm, scene.body[:count]), _bodies(around, scene.body[count:]))
+    bodies = (_bodies(arm, scene.shapes.body[:count]), _bodies(around, scene.shapes.body[count:]))
     leaf, leaves, root = _leaves(arm)
     leaf_pair = np.full((len(leaf), shapes), NO_PAIR)
     column = np.full(len(arm.rows), len(leaf))
@@ -56,20 +59,18 @@ def grouped(scene: MotionScene, carrier: IntArray | None = None) -> MotionScene:
     of_leaf &= second < len(arm.rows) + shapes
     pair = np.flatnonzero(of_leaf)
     leaf_pair[column[first[pair]], second[pair] - len(arm.rows)] = pair
+    spheres = np.concatenate([arm.rows[leaf, CENTRE : CENTRE + 3], arm.rows[leaf, BOUND, None]], 1)
     return scene._replace(
-        leaf=np.concatenate(
-            [arm.rows[leaf, CENTRE : CENTRE + 3], arm.rows[leaf, BOUND, None]], 1
-        ).T.copy(),
-        leaves=leaves,
-        leaf_shape=leaf,
-        root=root,
-        leaf_pair=leaf_pair,
-        boxes=np.array([count, len(arm.rows) + shapes]),
-        links=arm.rows,
-        link_frame=arm.frame,
-        fixed=around.rows,
-        body=np.concatenate(bodies),
-        **fields,
+        shapes=scene.shapes._replace(
+            links=arm.rows,
+            link_frame=arm.frame,
+            fixed=around.rows,
+            body=np.concatenate(bodies),
+            boxes=np.array([count, len(arm.rows) + shapes]),
+            root=root,
+        ),
+        pairs=pairs,
+        leaves=LeafSpheres(spheres=spheres.T.copy(), span=leaves, shape=leaf, pair=leaf_pair),
     )
 
 

@@ -24,7 +24,7 @@ from tcs.kernel.motion.scene import (
     MotionWorkspace,
     moved_shapes,
     new_motion_workspace,
-    pair_fields,
+    shape_pairs,
     with_pairs,
 )
 from tcs.kernel.views import unowned
@@ -42,7 +42,7 @@ IN_BOX = 16
 
 def without_idle_pairs(scene: MotionScene) -> MotionScene:
     """Return a scene, one without groups, without the pairs that never touch."""
-    return with_pairs(scene, needed_pairs(scene, np.ones(len(scene.pair), np.bool_)))
+    return with_pairs(scene, needed_pairs(scene, np.ones(len(scene.pairs.members), np.bool_)))
 
 
 def needed_pairs(scene: MotionScene, checked: BoolArray) -> BoolArray:
@@ -52,12 +52,13 @@ def needed_pairs(scene: MotionScene, checked: BoolArray) -> BoolArray:
         scene: A scene without groups.
         checked: Which pairs may be left out, shape (n_pairs,).
     """
-    needed = np.ones(len(scene.pair), np.bool_)
-    frame, base = scene.link_frame[scene.pair[:, 0]], scene.pair[:, 2]
+    pairs = scene.pairs
+    needed = np.ones(len(pairs.members), np.bool_)
+    frame, base = scene.shapes.link_frame[pairs.members[:, 0]], pairs.members[:, 2]
     between = frame - base
     checked = checked & (frame < FRAMES) & (base < FRAMES)
     which = np.flatnonzero(checked & (between <= MOST_BETWEEN))
-    turned = which[scene.slides[frame[which] - 1] == 0.0]
+    turned = which[scene.chain.slides[frame[which] - 1] == 0.0]
     if turned.size:
         needed[turned] = _needed_at_any_angle(scene, turned)
     which = which[needed[which] & (between[which] <= DIVIDED)]
@@ -68,7 +69,7 @@ def needed_pairs(scene: MotionScene, checked: BoolArray) -> BoolArray:
 
 def _needed(scene: MotionScene) -> BoolArray:
     """Return which pairs, with DIVIDED joints between their shapes at most, are needed."""
-    needed = np.zeros(len(scene.pair), np.bool_)
+    needed = np.zeros(len(scene.pairs.members), np.bool_)
     list_needed(scene, new_motion_workspace(scene), needed)
     return needed
 
@@ -93,26 +94,29 @@ def _needed_at_any_angle(scene: MotionScene, which: IntArray) -> BoolArray:
         scene: A scene without groups.
         which: Numbers of the pairs, shape (n,), which is that of the result.
     """
-    count, frame = len(scene.links), scene.link_frame
-    first, second = scene.pair[which, :2].T
+    shapes = scene.shapes
+    count, frame = len(shapes.links), shapes.link_frame
+    first, second = scene.pairs.members[which, :2].T
     boxes = _boxes_at_any_angle(scene, np.unique(first))
     added = len(boxes.rows)
     at = boxes.of_shape[first], second
-    gap = np.zeros((added, count + len(scene.fixed)))
-    np.maximum.at(gap, at, scene.gap[which])
+    gap = np.zeros((added, count + len(shapes.fixed)))
+    np.maximum.at(gap, at, scene.pairs.gap[which])
     box, other = np.nonzero(gap)
     carrying = np.where(other < count, frame[np.minimum(other, count - 1)], 0)
     # The boxes come after the shapes of the arm.
     pair = np.stack([count + box, other + added * (other >= count), carrying], axis=1)
-    links = np.concatenate([scene.links, boxes.rows])
+    links = np.concatenate([shapes.links, boxes.rows])
     of_boxes = scene._replace(
-        links=links,
-        link_frame=np.concatenate([frame, boxes.link]),
-        body=np.insert(scene.body, count, boxes.body),
+        shapes=shapes._replace(
+            links=links,
+            link_frame=np.concatenate([frame, boxes.link]),
+            body=np.insert(shapes.body, count, boxes.body),
+            root=np.arange(len(links)),
+        ),
+        pairs=shape_pairs(links, shapes.fixed, pair, gap[box, other]),
         # Tables hold at the angle of that joint alone.
         distances=scene.distances._replace(of_bodies=np.full_like(scene.distances.of_bodies, -1)),
-        root=np.arange(len(links)),
-        **pair_fields(links, scene.fixed, pair, gap[box, other]),
     )
     needed = np.zeros(gap.shape, np.bool_)
     needed[box, other] = _needed(of_boxes)
@@ -125,17 +129,18 @@ def _boxes_at_any_angle(scene: MotionScene, members: IntArray) -> _Boxes:
 
     They enclose shapes of one body each that are beside each other along the axis of the joint.
     """
-    carrier = scene.link_frame[members] * (scene.body.max() + 1) + scene.body[members]
-    order = np.lexsort((scene.links[members, CENTRE + 2], carrier))
+    shapes = scene.shapes
+    carrier = shapes.link_frame[members] * (shapes.body.max() + 1) + shapes.body[members]
+    order = np.lexsort((shapes.links[members, CENTRE + 2], carrier))
     members, carrier = members[order], carrier[order]
     place = np.arange(len(members)) - np.searchsorted(carrier, carrier)
     begin = np.flatnonzero(place % IN_BOX == 0)
-    rows, link = _turned_boxes(scene.links[members], begin), scene.link_frame[members[begin]] - 1
+    rows, link = _turned_boxes(shapes.links[members], begin), shapes.link_frame[members[begin]] - 1
     for f in np.unique(link):
-        rows[link == f] = moved_shapes(rows[link == f], scene.chain_R[f], scene.chain_p[f, :3])
-    of_shape = np.full(len(scene.links), NONE)
+        rows[link == f] = moved_shapes(rows[link == f], scene.chain.R[f], scene.chain.p[f, :3])
+    of_shape = np.full(len(shapes.links), NONE)
     of_shape[members] = np.repeat(np.arange(len(begin)), np.diff(np.append(begin, len(members))))
-    return _Boxes(rows, link, scene.body[members[begin]], of_shape)
+    return _Boxes(rows, link, shapes.body[members[begin]], of_shape)
 
 
 def _turned_boxes(rows: FloatArray, begin: IntArray) -> FloatArray:
@@ -178,16 +183,17 @@ def list_needed(owned_scene: MotionScene, owned_work: MotionWorkspace, needed: B
         needed: Filled, shape (n_pairs,).
     """
     scene, work = unowned(owned_scene), unowned(owned_work)
+    pairs = scene.pairs
     for n in range(7):
-        work.q[n], work.delta[n] = 0.0, 0.0
+        work.posture.q[n], work.piece.delta[n] = 0.0, 0.0
     first = 0
-    while first < len(scene.pair):
-        i, base = scene.pair[first, 0], scene.pair[first, 2]
-        body = scene.body[scene.pair[first, 1]]
+    while first < len(pairs.members):
+        i, base = pairs.members[first, 0], pairs.members[first, 2]
+        body = scene.shapes.body[pairs.members[first, 1]]
         last = first + 1
-        while last < len(scene.pair) and _is_of(scene, last, i, base, body):
+        while last < len(pairs.members) and _is_of(scene, last, i, base, body):
             last += 1
-        if scene.link_frame[i] == base:
+        if scene.shapes.link_frame[i] == base:
             take_posture(scene, work)
             for k in range(first, last):
                 needed[k] = is_near(scene, work, k, False)
@@ -199,8 +205,8 @@ def list_needed(owned_scene: MotionScene, owned_work: MotionWorkspace, needed: B
 @inner
 def _is_of(scene: MotionScene, k: int, i: int, base: int, body: int) -> bool:
     """Return whether pair k is of shape i and one of a body on link `base`."""
-    pair = scene.pair[k]
-    return bool(pair[0] == i and pair[2] == base and scene.body[pair[1]] == body)
+    pair = scene.pairs.members[k]
+    return bool(pair[0] == i and pair[2] == base and scene.shapes.body[pair[1]] == body)
 
 
 @inner
@@ -219,8 +225,12 @@ def _find_needed(
         end: One after the last pair.
         needed: Filled.
     """
-    span, stretch, pairs, top = work.span, work.stretch, work.pairs, 2
-    first, second = scene.pair[begin, 2], scene.link_frame[scene.pair[begin, 0]] - 1
+    uncertified, piece = work.uncertified, work.piece
+    span, stretch, pairs, top = uncertified.span, uncertified.stretch, uncertified.pairs, 2
+    first, second = (
+        scene.pairs.members[begin, 2],
+        scene.shapes.link_frame[scene.pairs.members[begin, 0]] - 1,
+    )
     _take_ranges(scene, work, first, second)
     cells = 0
     for k in range(begin, end):
@@ -231,7 +241,7 @@ def _find_needed(
         for n in range(2):
             # If both are the same joint, the second part is in force.
             joint, low, high = second if n == 1 else first, span[top + n, 0], span[top + n, 1]
-            work.q[joint], work.delta[joint] = 0.5 * (low + high), 0.5 * (high - low)
+            work.posture.q[joint], piece.delta[joint] = 0.5 * (low + high), 0.5 * (high - low)
         take_posture(scene, work)
         cells += 1
         used = to = stretch[top, 1]
@@ -245,7 +255,7 @@ def _find_needed(
                 pairs[to] = k
                 to += 1
         if to > used:
-            n = 0 if work.delta[first] > work.delta[second] else 1
+            n = 0 if piece.delta[first] > piece.delta[second] else 1
             for m in range(2):
                 span[top + 2 + m, 0], span[top + 2 + m, 1] = span[top + m, 0], span[top + m, 1]
                 stretch[top + 2 * m, 0], stretch[top + 2 * m, 1] = used, to
@@ -257,11 +267,12 @@ def _find_needed(
 @inner
 def _take_ranges(scene: MotionScene, work: MotionWorkspace, first: int, second: int) -> None:
     """Fill the first two rows of `span` with the whole ranges of two joints; others rest at 0."""
+    limits = scene.limits
     for n in range(7):
-        work.q[n], work.delta[n] = 0.0, 0.0
+        work.posture.q[n], work.piece.delta[n] = 0.0, 0.0
     for n in range(2):
         joint = second if n == 1 else first
-        low, high = scene.lower[joint], scene.upper[joint]
-        if scene.period[joint] > 0.0:
+        low, high = limits.lower[joint], limits.upper[joint]
+        if limits.period[joint] > 0.0:
             low, high = -np.pi, np.pi
-        work.span[n, 0], work.span[n, 1] = low, high
+        work.uncertified.span[n, 0], work.uncertified.span[n, 1] = low, high

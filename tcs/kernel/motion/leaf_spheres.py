@@ -16,15 +16,21 @@ def compare_spheres(
 
     Args:
         scene: The scene.
-        work: Scratch; `excess` is filled, below 0 for each sphere that is closer, and `other`.
+        work: Scratch; `separation.excess` is filled, below 0 for each sphere that is closer, and
+            `separation.other`.
         k: Pair of the box around the shapes and the fixed shape.
         apart: Distance that spheres keep from the core of the fixed shape: a box, a segment along z
             or a point [m].
-        first: First column of the shapes in `scene.leaf`.
+        first: First column of the shapes in `scene.leaves`.
         last: One after their last column.
     """
-    j, shapes, frame = scene.pair[k, 1], work.shapes, scene.link_frame[scene.pair[k, 0]]
-    R, p = work.link_R[frame], work.link_p[frame]
+    posture, leaves = work.posture, scene.leaves
+    j, shapes, frame = (
+        scene.pairs.members[k, 1],
+        posture.shapes,
+        scene.shapes.link_frame[scene.pairs.members[k, 0]],
+    )
+    R, p = posture.link_R[frame], posture.link_p[frame]
     hx = hy = hz = 0.0
     if shapes[j, TYPE] == BOX:
         hx, hy, hz = shapes[j, SIZE], shapes[j, SIZE + 1], shapes[j, SIZE + 2]
@@ -45,12 +51,16 @@ def compare_spheres(
     a, b, c = shapes[j, ROTATION + 2], shapes[j, ROTATION + 5], shapes[j, ROTATION + 8]
     zx, zy, zz = _in_link(R, a, b, c)
     dz = a * px + b * py + c * pz
-    other = work.other
+    other = work.separation.other
     other[0, 0], other[0, 1], other[0, 2], other[3, 0], other[4, 0] = xx, xy, xz, dx, hx
     other[1, 0], other[1, 1], other[1, 2], other[3, 1], other[4, 1] = yx, yy, yz, dy, hy
     other[2, 0], other[2, 1], other[2, 2], other[3, 2], other[4, 2] = zx, zy, zz, dz, hz
-    u, v, w = scene.leaf[0, first:last], scene.leaf[1, first:last], scene.leaf[2, first:last]
-    bound, excess = scene.leaf[3, first:last], work.excess
+    u, v, w = (
+        leaves.spheres[0, first:last],
+        leaves.spheres[1, first:last],
+        leaves.spheres[2, first:last],
+    )
+    bound, excess = leaves.spheres[3, first:last], work.separation.excess
     near = 0
     # No branch and no early end: LLVM makes this loop a vector loop.
     for n in range(len(u)):

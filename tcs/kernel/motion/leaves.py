@@ -25,11 +25,12 @@ def contact_here(scene: MotionScene, work: MotionWorkspace) -> int:
         scene: The scene.
         work: Scratch, with the current posture, at which no joint moves.
     """
-    for i in scene.roots:
+    pairs = scene.pairs
+    for i in pairs.roots:
         place_shape(scene, work, i)
-    for at in range(len(scene.roots) - 1, -1, -1):
-        i = scene.roots[at]
-        first, moving, last = scene.first_pair[i], scene.first_moving[i], scene.first_pair[i + 1]
+    for at in range(len(pairs.roots) - 1, -1, -1):
+        i = pairs.roots[at]
+        first, moving, last = pairs.first[i], pairs.first_moving[i], pairs.first[i + 1]
         while first < moving:
             end = min(first + GROUP, moving)
             if any_overlap(scene, work, i, first, end, 0.0):
@@ -40,7 +41,7 @@ def contact_here(scene: MotionScene, work: MotionWorkspace) -> int:
                             return found
             first = end
         if append_near(scene, work, moving, last, 0.0, 0, 1) > 0:
-            return work.pairs[0]
+            return work.uncertified.pairs[0]
     return NO_PAIR
 
 
@@ -53,17 +54,22 @@ def _contact_below(scene: MotionScene, work: MotionWorkspace, k: int) -> int:
         work: Scratch, with the current posture; the shapes of the pair are placed.
         k: Pair of a shape or box of the arm and a fixed one.
     """
-    i, j = scene.pair[k, 0], scene.pair[k, 1]
-    fixed, first, last = j - len(scene.links), scene.leaves[i, 0], scene.leaves[i, 1]
-    if first == last or fixed >= scene.leaf_pair.shape[1]:
-        return work.pairs[0] if append_near(scene, work, k, k + 1, 0.0, 0, 1) > 0 else NO_PAIR
-    if not groups_may_touch(work.shapes, i, j, scene.gap[k]):
+    pairs, leaves, posture = scene.pairs, scene.leaves, work.posture
+    i, j = pairs.members[k, 0], pairs.members[k, 1]
+    fixed, first, last = j - len(scene.shapes.links), leaves.span[i, 0], leaves.span[i, 1]
+    if first == last or fixed >= leaves.pair.shape[1]:
+        return (
+            work.uncertified.pairs[0]
+            if append_near(scene, work, k, k + 1, 0.0, 0, 1) > 0
+            else NO_PAIR
+        )
+    if not groups_may_touch(posture.shapes, i, j, pairs.gap[k]):
         return NO_PAIR
-    apart = scene.gap[k] + (0.0 if work.shapes[j, TYPE] == BOX else work.shapes[j, SIZE])
+    apart = pairs.gap[k] + (0.0 if posture.shapes[j, TYPE] == BOX else posture.shapes[j, SIZE])
     if compare_spheres(scene, work, k, apart, first, last) > 0:
         for n in range(first, last):
-            if work.excess[n - first] < 0.0 and not _face_clears(scene, work, n, apart):
-                m = scene.leaf_pair[n, fixed]
+            if work.separation.excess[n - first] < 0.0 and not _face_clears(scene, work, n, apart):
+                m = leaves.pair[n, fixed]
                 if m != NO_PAIR and is_near(scene, work, m, False):
                     return m
     return NO_PAIR
@@ -76,11 +82,12 @@ def _face_clears(scene: MotionScene, work: MotionWorkspace, n: int, apart: float
     Args:
         scene: The scene.
         work: Scratch, with what `compare_spheres` fills.
-        n: Column of the shape in `scene.leaf`.
+        n: Column of the shape in `scene.leaves`.
         apart: Distance that the shape keeps from the core of the fixed one [m].
     """
-    links, i, other = scene.links, scene.leaf_shape[n], work.other
-    x, y, z = scene.leaf[0, n], scene.leaf[1, n], scene.leaf[2, n]
+    leaves = scene.leaves
+    links, i, other = scene.shapes.links, leaves.shape[n], work.separation.other
+    x, y, z = leaves.spheres[0, n], leaves.spheres[1, n], leaves.spheres[2, n]
     for m in range(3):
         a, b, c = other[m, 0], other[m, 1], other[m, 2]
         away = abs(a * x + b * y + c * z + other[3, m]) - other[4, m] - apart

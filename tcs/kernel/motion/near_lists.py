@@ -16,7 +16,7 @@ FAR = 0.25
 
 @inner
 def list_near(scene: MotionScene, work: MotionWorkspace, extra: float, most: int) -> int:
-    """List the pairs that may touch on the current piece from `work.pairs[0]` on.
+    """List the pairs that may touch on the current piece from `uncertified.pairs[0]` on.
 
     Args:
         scene: The scene.
@@ -27,14 +27,15 @@ def list_near(scene: MotionScene, work: MotionWorkspace, extra: float, most: int
     Returns:
         Number of pairs listed.
     """
+    pairs = scene.pairs
     count = 0
-    for i in scene.roots:
+    for i in pairs.roots:
         place_shape(scene, work, i)
-    for i in scene.roots:
-        first, moving, last = scene.first_pair[i], scene.first_moving[i], scene.first_pair[i + 1]
+    for i in pairs.roots:
+        first, moving, last = pairs.first[i], pairs.first_moving[i], pairs.first[i + 1]
         while first < moving and count < most:
             end = min(first + GROUP, moving)
-            apart = work.motion[i, 0] + extra
+            apart = work.piece.motion[i, 0] + extra
             if any_overlap(scene, work, i, first, end, apart):
                 for k in range(first, end):
                     if count < most and overlaps(scene, work, i, k, first, apart):
@@ -53,15 +54,16 @@ def list_near(scene: MotionScene, work: MotionWorkspace, extra: float, most: int
 @inner
 def has_leaves(scene: MotionScene, k: int) -> bool:
     """Return whether pair k, always checked, is of a box around a link and a single fixed shape."""
-    i, fixed = scene.pair[k, 0], scene.pair[k, 1] - len(scene.links)
-    return scene.leaves[i, 0] < scene.leaves[i, 1] and fixed < scene.leaf_pair.shape[1]
+    leaves = scene.leaves
+    i, fixed = scene.pairs.members[k, 0], scene.pairs.members[k, 1] - len(scene.shapes.links)
+    return leaves.span[i, 0] < leaves.span[i, 1] and fixed < leaves.pair.shape[1]
 
 
 @inner
 def _append_leaves(
     scene: MotionScene, work: MotionWorkspace, k: int, extra: float, count: int, most: int
 ) -> int:
-    """Append the pairs of a link's shapes and a fixed shape that may touch to `work.pairs`.
+    """Append the pairs of a link's shapes and a fixed shape that may touch to `uncertified.pairs`.
 
     Where the box around the link moves far for its size, its pair is appended by `append_below`.
 
@@ -76,17 +78,18 @@ def _append_leaves(
     Returns:
         Number of pairs listed.
     """
-    i, j, shapes = scene.pair[k, 0], scene.pair[k, 1], work.shapes
-    moved, first, last = work.motion[i, 0], scene.leaves[i, 0], scene.leaves[i, 1]
+    pairs, leaves = scene.pairs, scene.leaves
+    i, j, shapes = pairs.members[k, 0], pairs.members[k, 1], work.posture.shapes
+    moved, first, last = work.piece.motion[i, 0], leaves.span[i, 0], leaves.span[i, 1]
     if not may_touch_on_piece(scene, work, k, moved, extra):
         return count
-    if moved > FAR * scene.bound[k]:
+    if moved > FAR * pairs.bound[k]:
         return append_below(scene, work, k, moved, extra, count, most)
-    apart = scene.gap[k] + extra + moved + (0.0 if shapes[j, TYPE] == BOX else shapes[j, SIZE])
+    apart = pairs.gap[k] + extra + moved + (0.0 if shapes[j, TYPE] == BOX else shapes[j, SIZE])
     if compare_spheres(scene, work, k, apart, first, last) > 0:
         for n in range(first, last):
-            m = scene.leaf_pair[n, j - len(scene.links)]
-            if work.excess[n - first] < 0.0 and m != NO_PAIR:
+            m = leaves.pair[n, j - len(scene.shapes.links)]
+            if work.separation.excess[n - first] < 0.0 and m != NO_PAIR:
                 count = append_near(scene, work, m, m + 1, extra, count, most)
                 if count == most:
                     break
@@ -101,16 +104,17 @@ def any_overlap(
 
     Args:
         scene: The scene.
-        work: Scratch, with the current posture; `apart` is filled, below 0 for each pair whose
-            spheres are closer.
+        work: Scratch, with the current posture; `separation.apart` is filled, below 0 for each
+            pair whose spheres are closer.
         i: Shape of the arm.
         first: First pair.
         last: One after the last pair, GROUP later at most.
         extra: Added to the gap of each pair [m].
     """
-    gap, bound = scene.gap[first:last], scene.bound[first:last]
-    u, v, w = scene.centre[0, first:last], scene.centre[1, first:last], scene.centre[2, first:last]
-    shapes, excess = work.shapes, work.apart
+    pairs = scene.pairs
+    gap, bound = pairs.gap[first:last], pairs.bound[first:last]
+    u, v, w = pairs.centre[0, first:last], pairs.centre[1, first:last], pairs.centre[2, first:last]
+    shapes, excess = work.posture.shapes, work.separation.apart
     x, y, z = shapes[i, CENTRE], shapes[i, CENTRE + 1], shapes[i, CENTRE + 2]
     overlaps = 0
     # No branch and no early end: LLVM makes this loop a vector loop.
@@ -130,9 +134,10 @@ def overlaps(
 
     The bounding sphere of the fixed shape is compared with shape i itself too: links are long.
     """
-    if work.apart[k - first] >= 0.0:
+    pairs = scene.pairs
+    if work.separation.apart[k - first] >= 0.0:
         return False
-    shapes, centre = work.shapes, scene.centre
+    shapes, centre = work.posture.shapes, pairs.centre
     if shapes[i, TYPE] != BOX:
         return True
     dx, dy, dz = (
@@ -140,7 +145,7 @@ def overlaps(
         centre[1, k] - shapes[i, CENTRE + 1],
         centre[2, k] - shapes[i, CENTRE + 2],
     )
-    square, apart = 0.0, scene.bound[k] - shapes[i, BOUND] + scene.gap[k] + extra
+    square, apart = 0.0, pairs.bound[k] - shapes[i, BOUND] + pairs.gap[k] + extra
     for m in range(3):
         along = (
             shapes[i, ROTATION + m] * dx
@@ -162,7 +167,7 @@ def append_near(
     count: int,
     most: int,
 ) -> int:
-    """Append pairs that may touch to `work.pairs`; return how many there are.
+    """Append pairs that may touch to `uncertified.pairs`; return how many there are.
 
     Args:
         scene: The scene.
@@ -173,9 +178,10 @@ def append_near(
         count: Number of pairs listed already.
         most: Number of pairs after which to stop.
     """
+    pairs = scene.pairs
     for k in range(first, last):
-        place_shape(scene, work, scene.pair[k, 0])
-        moved = work.motion[scene.pair[k, 0], scene.pair[k, 2]]
+        place_shape(scene, work, pairs.members[k, 0])
+        moved = work.piece.motion[pairs.members[k, 0], pairs.members[k, 2]]
         if may_touch_on_piece(scene, work, k, moved, extra):
             count = append_below(scene, work, k, moved, extra, count, most)
             if count == most:
@@ -193,7 +199,7 @@ def append_below(
     count: int,
     most: int,
 ) -> int:
-    """Append a pair that may touch to `work.pairs`, or those of the pairs below it that may.
+    """Append a pair that may touch to `uncertified.pairs`, or those of the pairs below it that may.
 
     A pair of groups that move far for their size is appended itself: nearly all pairs below it may
     touch on the piece, and fewer of them on its halves.
@@ -210,13 +216,13 @@ def append_below(
     Returns:
         Number of pairs listed.
     """
-    pairs, stack, below = work.pairs, work.stack, scene.below
+    pairs, stack, below = work.uncertified.pairs, work.uncertified.stack, scene.pairs.below
     whole, top = moved, 0
     still = _are_boxes(scene, k)
     if still:
-        take_frames(scene, work, scene.pair[k, 0], scene.pair[k, 1])
+        take_frames(scene, work, scene.pairs.members[k, 0], scene.pairs.members[k, 1])
     while count < most:
-        if is_of_groups(scene, k) and moved <= FAR * scene.bound[k]:
+        if is_of_groups(scene, k) and moved <= FAR * scene.pairs.bound[k]:
             for n in range(below[k, 0], below[k, 1]):
                 stack[top] = n
                 top += 1
@@ -227,17 +233,21 @@ def append_below(
         while top and not near:
             top -= 1
             k = stack[top]
-            i, j, base = scene.pair[k, 0], scene.pair[k, 1], scene.pair[k, 2]
+            i, j, base = (
+                scene.pairs.members[k, 0],
+                scene.pairs.members[k, 1],
+                scene.pairs.members[k, 2],
+            )
             if still and _are_boxes(scene, k):
-                if boxes_apart(scene, work, i, j, scene.gap[k] + extra + whole):
+                if boxes_apart(scene, work, i, j, scene.pairs.gap[k] + extra + whole):
                     continue
-                if whole <= FAR * scene.bound[k]:
+                if whole <= FAR * scene.pairs.bound[k]:
                     moved, near = whole, True
                     continue
             place_shape(scene, work, i)
             if base > 0:
                 place_shape(scene, work, j)
-            moved = work.motion[i, base]
+            moved = work.piece.motion[i, base]
             near = may_touch_on_piece(scene, work, k, moved, extra)
         if not near:
             break
@@ -247,4 +257,7 @@ def append_below(
 @inner
 def _are_boxes(scene: MotionScene, k: int) -> bool:
     """Return whether pair k is of a box around shapes of a link and one around fixed shapes."""
-    return bool(scene.pair[k, 0] >= scene.boxes[0] and scene.pair[k, 1] >= scene.boxes[1])
+    return bool(
+        scene.pairs.members[k, 0] >= scene.shapes.boxes[0]
+        and scene.pairs.members[k, 1] >= scene.shapes.boxes[1]
+    )

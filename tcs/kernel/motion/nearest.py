@@ -79,7 +79,7 @@ def _any_nearer(
     # No branch and no early end: LLVM makes these loops vector loops.
     for k in range(7):
         joint, at = trees.joint[side, k, first:last], np.float32(target[k])
-        weight, period = np.float32(scene.weight[k]), np.float32(scene.period[k])
+        weight, period = np.float32(scene.chain.weight[k]), np.float32(scene.limits.period[k])
         if period > 0.0:
             for n in range(len(square)):
                 angle = joint[n] - at

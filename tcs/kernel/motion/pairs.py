@@ -39,18 +39,19 @@ GROWN = 1.0 + ROUNDING
 
 @inner
 def place_shape(scene: MotionScene, work: MotionWorkspace, i: int) -> None:
-    """Place shape i of the arm at the current posture and fill its row of `motion`."""
-    if work.placed[i] == work.posture[0]:
+    """Place shape i of the arm at the current posture and fill its row of `piece.motion`."""
+    posture, piece = work.posture, work.piece
+    if posture.placed[i] == posture.number[0]:
         return
-    work.placed[i] = work.posture[0]
-    frame, shapes = scene.link_frame[i], work.shapes
-    move(work.link_R[frame], work.link_p[frame], scene.links, i, shapes, i)
-    if work.posture[1] == 0:
+    posture.placed[i] = posture.number[0]
+    frame, shapes = scene.shapes.link_frame[i], posture.shapes
+    move(posture.link_R[frame], posture.link_p[frame], scene.shapes.links, i, shapes, i)
+    if piece.known[0] == 0:
         for k in range(_columns(scene, frame)):
-            work.motion[i, k] = 0.0
+            piece.motion[i, k] = 0.0
         return
-    root = scene.root[i]
-    if root != i and work.posture[1] == TWISTED:
+    root = scene.shapes.root[i]
+    if root != i and piece.known[0] == TWISTED:
         _bound_motion_in_box(scene, work, i, root)
     else:
         _bound_motion(scene, work, i)
@@ -59,7 +60,7 @@ def place_shape(scene: MotionScene, work: MotionWorkspace, i: int) -> None:
 @inner
 def _columns(scene: MotionScene, frame: int) -> int:
     """Return the number of columns of `motion` and `rest` that hold for a shape on a link."""
-    coupled = len(scene.coupled)
+    coupled = len(scene.chain.coupled)
     return frame + 1 if coupled == 0 else FRAMES + coupled
 
 
@@ -71,45 +72,55 @@ def _bound_motion_in_box(scene: MotionScene, work: MotionWorkspace, i: int, root
     bounded by the twist of its link too, which says what part of the box it is; this takes a
     fifth of the time that `_bound_motion` does.
     """
-    if work.placed[root] != work.posture[0]:
-        work.placed[root] = work.posture[0]
-        frame = scene.link_frame[root]
-        move(work.link_R[frame], work.link_p[frame], scene.links, root, work.shapes, root)
+    posture, shapes, piece = work.posture, scene.shapes, work.piece
+    if posture.placed[root] != posture.number[0]:
+        posture.placed[root] = posture.number[0]
+        frame = shapes.link_frame[root]
+        move(
+            posture.link_R[frame],
+            posture.link_p[frame],
+            shapes.links,
+            root,
+            posture.shapes,
+            root,
+        )
         _bound_motion(scene, work, root)
-    frame = scene.link_frame[i]
+    frame = shapes.link_frame[i]
     for k in range(_columns(scene, frame)):
-        work.motion[i, k], work.rest[i, k] = work.motion[root, k], work.rest[root, k]
-    work.by_tool[i] = work.by_tool[root]
-    twist = work.turn if work.by_tool[i] else work.twist
-    work.motion[i, 0] = min(
-        work.motion[root, 0], _motion_of_twist(work, i, twist[frame]) + work.rest[root, 0]
+        piece.motion[i, k], piece.rest[i, k] = piece.motion[root, k], piece.rest[root, k]
+    piece.by_tool[i] = piece.by_tool[root]
+    twist = piece.tool_twist if piece.by_tool[i] else piece.twist
+    piece.motion[i, 0] = min(
+        piece.motion[root, 0],
+        _motion_of_twist(work, i, twist[frame]) + piece.rest[root, 0],
     )
 
 
 @inner
 def _bound_motion(scene: MotionScene, work: MotionWorkspace, i: int) -> None:
     """Fill the rows of `motion` and `rest` of shape i, placed at the current posture."""
-    frame = scene.link_frame[i]
+    piece, chain = work.piece, scene.chain
+    frame = scene.shapes.link_frame[i]
     total = second = 0.0
-    work.motion[i, frame] = work.rest[i, frame] = 0.0
+    piece.motion[i, frame] = piece.rest[i, frame] = 0.0
     last, part = frame, 1.0
     if frame >= FRAMES:
-        last, part = int(scene.coupled[frame - FRAMES, 0]) + 1, scene.coupled[frame - FRAMES, 1]
+        last, part = int(chain.coupled[frame - FRAMES, 0]) + 1, chain.coupled[frame - FRAMES, 1]
     for k in range(last, 0, -1):
-        if len(scene.coupled) > 0:
+        if len(chain.coupled) > 0:
             _bound_between(scene, work, i, k, part, total, second)
-        if work.delta[k - 1] > 0.0:
-            slide = part * scene.slides[k - 1]
+        if piece.delta[k - 1] > 0.0:
+            slide = part * chain.slides[k - 1]
             total, second = _with_joint(work, i, k, slide, total, second)
-        work.motion[i, k - 1], work.rest[i, k - 1] = total, 0.5 * second
+        piece.motion[i, k - 1], piece.rest[i, k - 1] = total, 0.5 * second
         part = 1.0
-    work.by_tool[i] = False
-    if work.posture[1] == TWISTED:
+    piece.by_tool[i] = False
+    if piece.known[0] == TWISTED:
         if SEEN_FROM_TOOL <= frame < FRAMES and follows_line(work):
             _bound_motion_by_tool(scene, work, i, frame)
-        twist = work.turn if work.by_tool[i] else work.twist
-        moved = _motion_of_twist(work, i, twist[frame]) + work.rest[i, 0]
-        work.motion[i, 0] = min(work.motion[i, 0], moved)
+        twist = piece.tool_twist if piece.by_tool[i] else piece.twist
+        moved = _motion_of_twist(work, i, twist[frame]) + piece.rest[i, 0]
+        piece.motion[i, 0] = min(piece.motion[i, 0], moved)
 
 
 @inner
@@ -133,31 +144,33 @@ def _bound_between(
         total: As for `_with_joint`.
         second: As for `_with_joint`.
     """
-    for n in range(len(scene.coupled)):
-        if int(scene.coupled[n, 0]) == k - 1 and scene.coupled[n, 1] < part:
-            slide = (part - scene.coupled[n, 1]) * scene.slides[k - 1]
-            moved = slide * work.delta[k - 1] * GROWN
-            bend = slide * work.bend[k - 1] * GROWN
-            work.motion[i, FRAMES + n] = total + moved
-            work.rest[i, FRAMES + n] = 0.5 * (second + bend)
+    chain, piece = scene.chain, work.piece
+    for n in range(len(chain.coupled)):
+        if int(chain.coupled[n, 0]) == k - 1 and chain.coupled[n, 1] < part:
+            slide = (part - chain.coupled[n, 1]) * chain.slides[k - 1]
+            moved = slide * piece.delta[k - 1] * GROWN
+            bend = slide * piece.bend[k - 1] * GROWN
+            piece.motion[i, FRAMES + n] = total + moved
+            piece.rest[i, FRAMES + n] = 0.5 * (second + bend)
 
 
 @inner
 def _bound_motion_by_tool(scene: MotionScene, work: MotionWorkspace, i: int, frame: int) -> None:
     """Bound the motion of shape i on link `frame` by the joints between it and the tool.
 
-    The tool follows a line, so these joints alone decide how far the shape is from where `turn`
-    leads it. Fills the rows of `motion` and `rest` relative to what is fixed, and `by_tool`, where
-    they are less than by the joints between the shape and the base.
+    The tool follows a line, so these joints alone decide how far the shape is from where
+    `tool_twist` leads it. Fills the rows of `motion` and `rest` relative to what is fixed, and
+    `by_tool`, where they are less than by the joints between the shape and the base.
     """
+    piece = work.piece
     total = second = 0.0
     for k in range(frame + 1, 8):
-        if work.delta[k - 1] > 0.0:
-            total, second = _with_joint(work, i, k, scene.slides[k - 1], total, second)
+        if piece.delta[k - 1] > 0.0:
+            total, second = _with_joint(work, i, k, scene.chain.slides[k - 1], total, second)
     off = off_line(work, total)
-    if 0.5 * second + off < work.rest[i, 0]:
-        work.by_tool[i], work.rest[i, 0] = True, 0.5 * second + off
-        work.motion[i, 0] = min(work.motion[i, 0], total + line_motion(work) + off)
+    if 0.5 * second + off < piece.rest[i, 0]:
+        piece.by_tool[i], piece.rest[i, 0] = True, 0.5 * second + off
+        piece.motion[i, 0] = min(piece.motion[i, 0], total + line_motion(work) + off)
 
 
 @inner
@@ -177,11 +190,12 @@ def _with_joint(
     Returns:
         `total` and `second` with joint k.
     """
-    shapes, angle = work.shapes, work.delta[k - 1]
+    posture, piece = work.posture, work.piece
+    shapes, angle = posture.shapes, piece.delta[k - 1]
     if slide > 0.0:
         # It moves all points alike, whatever the joints between do.
-        return total + slide * angle * GROWN, second + slide * work.bend[k - 1] * GROWN
-    R, p = work.link_R[k], work.link_p[k]
+        return total + slide * angle * GROWN, second + slide * piece.bend[k - 1] * GROWN
+    R, p = posture.link_R[k], posture.link_p[k]
     dx, dy, dz = (
         shapes[i, CENTRE] - p[0],
         shapes[i, CENTRE + 1] - p[1],
@@ -204,14 +218,14 @@ def _with_joint(
             radius = _radius_about(shapes, i, R)
     away = np.sqrt(square) + radius + total
     # Of the second derivative of a point: the terms of two joints, of one, of its own.
-    second += (angle * (2.0 * total + angle * away) + work.bend[k - 1] * away) * GROWN
+    second += (angle * (2.0 * total + angle * away) + piece.bend[k - 1] * away) * GROWN
     return total + angle * away * GROWN, second
 
 
 @inner
 def _motion_of_twist(work: MotionWorkspace, i: int, twist: FloatArray) -> float:
     """Return a bound on the motion of any point of shape i by a twist of its link [m]."""
-    shapes = work.shapes
+    shapes = work.posture.shapes
     wx, wy, wz = twist[0], twist[1], twist[2]
     x, y, z = shapes[i, CENTRE], shapes[i, CENTRE + 1], shapes[i, CENTRE + 2]
     vx, vy, vz = (
@@ -253,29 +267,45 @@ def _radius_about(shapes: FloatArray, i: int, R: FloatArray) -> float:
 
 @inner
 def take_posture(scene: MotionScene, work: MotionWorkspace) -> None:
-    """Make `work.q` the current posture: shapes are placed anew when next used."""
-    work.posture[0] += 1
-    work.posture[1] = 0
+    """Make `posture.q` the current posture: shapes are placed anew when next used."""
+    posture, piece, chain = work.posture, work.piece, scene.chain
+    posture.number[0] += 1
+    piece.known[0] = 0
     for k in range(7):
-        if work.delta[k] > 0.0:
-            work.posture[1] = 1
-    place_links(scene.chain_R, scene.chain_p, work.q, work.turns, work.link_R, work.link_p)
-    for n in range(len(scene.coupled)):
-        k = int(scene.coupled[n, 0])
-        R, p = work.link_R[k + 1], work.link_p[k + 1]
-        behind = (1.0 - scene.coupled[n, 1]) * scene.slides[k] * work.q[k]
+        if piece.delta[k] > 0.0:
+            piece.known[0] = 1
+    place_links(
+        chain.R,
+        chain.p,
+        posture.q,
+        posture.turns,
+        posture.link_R,
+        posture.link_p,
+    )
+    for n in range(len(chain.coupled)):
+        k = int(chain.coupled[n, 0])
+        R, p = posture.link_R[k + 1], posture.link_p[k + 1]
+        behind = (1.0 - chain.coupled[n, 1]) * chain.slides[k] * posture.q[k]
         for r in range(3):
             for c in range(3):
-                work.link_R[FRAMES + n, r, c] = R[r, c]
-            work.link_p[FRAMES + n, r] = p[r] - behind * R[r, 2]
+                posture.link_R[FRAMES + n, r, c] = R[r, c]
+            posture.link_p[FRAMES + n, r] = p[r] - behind * R[r, 2]
 
 
 @inner
 def take_turned_posture(scene: MotionScene, work: MotionWorkspace) -> None:
     """Do as `take_posture` where no joint moves, given the joints' sines and cosines in `turns`."""
-    work.posture[0] += 1
-    work.posture[1] = 0
-    place_turned(scene.chain_R, scene.chain_p, work.q, work.turns, work.link_R, work.link_p)
+    posture = work.posture
+    posture.number[0] += 1
+    work.piece.known[0] = 0
+    place_turned(
+        scene.chain.R,
+        scene.chain.p,
+        posture.q,
+        posture.turns,
+        posture.link_R,
+        posture.link_p,
+    )
 
 
 @inner
@@ -284,26 +314,30 @@ def is_near(scene: MotionScene, work: MotionWorkspace, k: int, grown: bool) -> b
 
     Near it is wherever no joint is farther from the posture than `delta`.
     """
-    i, j, base = scene.pair[k, 0], scene.pair[k, 1], scene.pair[k, 2]
+    pairs = scene.pairs
+    i, j, base = pairs.members[k, 0], pairs.members[k, 1], pairs.members[k, 2]
     place_shape(scene, work, i)
     if base > 0:
         place_shape(scene, work, j)
-    moved = work.motion[i, base] + ROUNDING if grown else 0.0
-    return _may_touch(work.shapes, i, j, scene.gap[k] + moved, moved) and not _table_clears(
-        scene, work, k, scene.gap[k], grown
+    moved = work.piece.motion[i, base] + ROUNDING if grown else 0.0
+    return _may_touch(work.posture.shapes, i, j, pairs.gap[k] + moved, moved) and not _table_clears(
+        scene, work, k, pairs.gap[k], grown
     )
 
 
 @inner
 def count_hit(scene: MotionScene, work: MotionWorkspace, k: int) -> None:
     """Count that pair k blocks a curve."""
-    work.hits[scene.body[scene.pair[k, 0]], scene.body[scene.pair[k, 1]]] += 1
+    work.contacts.hits[
+        scene.shapes.body[scene.pairs.members[k, 0]], scene.shapes.body[scene.pairs.members[k, 1]]
+    ] += 1
 
 
 @inner
 def is_of_groups(scene: MotionScene, k: int) -> bool:
     """Return whether there are pairs below pair k, so that it cannot be in contact itself."""
-    return k < len(scene.below) and scene.below[k, 0] < scene.below[k, 1]
+    pairs = scene.pairs
+    return k < len(pairs.below) and pairs.below[k, 0] < pairs.below[k, 1]
 
 
 @inner
@@ -314,8 +348,9 @@ def may_touch_on_piece(
 
     Its shapes are placed; they move by at most `moved` [m] relative to each other.
     """
-    i, j, base = scene.pair[k, 0], scene.pair[k, 1], scene.pair[k, 2]
-    shapes, within, of_groups = work.shapes, scene.gap[k] + extra, is_of_groups(scene, k)
+    pairs = scene.pairs
+    i, j, base = pairs.members[k, 0], pairs.members[k, 1], pairs.members[k, 2]
+    shapes, within, of_groups = work.posture.shapes, pairs.gap[k] + extra, is_of_groups(scene, k)
     if moved == 0.0:
         if of_groups:
             return groups_may_touch(shapes, i, j, within)
@@ -347,29 +382,31 @@ def _table_clears(
         within: The distance [m].
         grown: Whether they keep it wherever no joint is farther from the posture than `delta`.
     """
-    first = scene.body[scene.pair[k, 0]] - scene.robot
-    second = scene.body[scene.pair[k, 1]] - scene.robot
+    shapes = scene.shapes
+    first = shapes.body[scene.pairs.members[k, 0]] - shapes.robot
+    second = shapes.body[scene.pairs.members[k, 1]] - shapes.robot
     if second < 0:
         return False
     distances = scene.distances
     n = distances.of_bodies[first, second]
     if n < 0:
         return False
-    least = distance_bound(distances, n, work.q)
+    least = distance_bound(distances, n, work.posture.q)
     if grown:
         for m in range(2):
-            least -= distances.reach[n, m] * work.delta[distances.joint[n, m]] * GROWN
+            least -= distances.reach[n, m] * work.piece.delta[distances.joint[n, m]] * GROWN
     return least >= within
 
 
 @inner
 def is_near_on_piece(scene: MotionScene, work: MotionWorkspace, k: int) -> bool:
     """Return whether pair k may touch on the current piece of a curve."""
-    i, j, base = scene.pair[k, 0], scene.pair[k, 1], scene.pair[k, 2]
+    pairs = scene.pairs
+    i, j, base = pairs.members[k, 0], pairs.members[k, 1], pairs.members[k, 2]
     place_shape(scene, work, i)
     if base > 0:
         place_shape(scene, work, j)
-    return may_touch_on_piece(scene, work, k, work.motion[i, base], ROUNDING)
+    return may_touch_on_piece(scene, work, k, work.piece.motion[i, base], ROUNDING)
 
 
 @inner

@@ -31,7 +31,7 @@ from tcs.kernel.motion.scene import FRAMES, MotionScene, MotionWorkspace
 from tcs.kernel.motion.tool_line import follows_line, take_turns
 
 TWISTED = 2
-"""In `MotionWorkspace.posture`: joints move on the current piece, and the twists are filled."""
+"""In `PieceMotion.known`: joints move on the current piece, and the twists are filled."""
 
 
 class RelativeMotion(NamedTuple):
@@ -55,27 +55,28 @@ class RelativeMotion(NamedTuple):
 
 @inner
 def take_twists(scene: MotionScene, work: MotionWorkspace, half: float) -> None:
-    """Fill the motion of each link on the piece, to first order, from `work.rate`.
+    """Fill the motion of each link on the piece, to first order, from `piece.rate`.
 
     A point at r of link f moves by `w x r + v` until the end of the piece, and by as much backwards
-    until its begin; w and v are the first and the last three of row f of `work.twist`.
+    until its begin; w and v are the first and the last three of row f of `piece.twist`.
 
     Args:
         scene: The scene.
-        work: `twist` is filled, and `turn` where the tool follows a line.
+        work: `piece.twist` is filled, and `piece.tool_twist` where the tool follows a line.
         half: Half of the length of the piece, as a fraction of the curve.
     """
-    twist = work.twist
-    if work.posture[1] > 0:
-        work.posture[1] = TWISTED
+    piece, chain = work.piece, scene.chain
+    twist = piece.twist
+    if piece.known[0] > 0:
+        piece.known[0] = TWISTED
     for m in range(6):
         twist[0, m] = 0.0
     for k in range(7):
-        R, p, rate = work.link_R[k + 1], work.link_p[k + 1], work.rate[k]
-        if scene.slides[k] > 0.0:
+        R, p, rate = work.posture.link_R[k + 1], work.posture.link_p[k + 1], piece.rate[k]
+        if chain.slides[k] > 0.0:
             for r in range(3):
                 twist[k + 1, r] = twist[k, r]
-                twist[k + 1, 3 + r] = twist[k, 3 + r] + scene.slides[k] * rate * R[r, 2]
+                twist[k + 1, 3 + r] = twist[k, 3 + r] + chain.slides[k] * rate * R[r, 2]
             continue
         x, y, z = rate * R[0, 2], rate * R[1, 2], rate * R[2, 2]
         twist[k + 1, 0], twist[k + 1, 1], twist[k + 1, 2] = (
@@ -86,8 +87,8 @@ def take_twists(scene: MotionScene, work: MotionWorkspace, half: float) -> None:
         twist[k + 1, 3] = twist[k, 3] - (y * p[2] - z * p[1])
         twist[k + 1, 4] = twist[k, 4] - (z * p[0] - x * p[2])
         twist[k + 1, 5] = twist[k, 5] - (x * p[1] - y * p[0])
-    for n in range(len(scene.coupled)):
-        k, part = int(scene.coupled[n, 0]), scene.coupled[n, 1]
+    for n in range(len(chain.coupled)):
+        k, part = int(chain.coupled[n, 0]), chain.coupled[n, 1]
         for m in range(6):
             twist[FRAMES + n, m] = twist[k, m] + part * (twist[k + 1, m] - twist[k, m])
     if follows_line(work):
@@ -118,7 +119,7 @@ def plane_between(
         edges: Whether to try planes along an edge of both shapes, which takes longest, if both are
             boxes.
     """
-    shapes = work.shapes
+    shapes = work.posture.shapes
     motion = _relative_motion(scene, work, i, j, base, gap)
     if shapes[i, TYPE] != BOX or shapes[j, TYPE] != BOX:
         return _plane_across_shortest(shapes, i, j, motion, far)
@@ -132,8 +133,9 @@ def _relative_motion(
     scene: MotionScene, work: MotionWorkspace, i: int, j: int, base: int, gap: float
 ) -> RelativeMotion:
     """Return the motion of shape i relative to shape j, see `plane_between`."""
-    shapes, f = work.shapes, scene.link_frame[i]
-    twist = work.turn if base == 0 and work.by_tool[i] else work.twist
+    piece = work.piece
+    shapes, f = work.posture.shapes, scene.shapes.link_frame[i]
+    twist = piece.tool_twist if base == 0 and piece.by_tool[i] else piece.twist
     wx, wy, wz = (
         twist[f, 0] - twist[base, 0],
         twist[f, 1] - twist[base, 1],
@@ -150,7 +152,7 @@ def _relative_motion(
         wx,
         wy,
         wz,
-        gap + work.rest[i, base],
+        gap + piece.rest[i, base],
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,29 +34,22 @@ SEEN_FROM_TOOL = 4
 on that side than on the other."""
 
 
-class MotionScene(NamedTuple):
-    """One arm among fixed shapes. Frames as in `tcs.kernel.arrays`.
+class MotionChain(NamedTuple):
+    """The chain of the arm, and how far its joints move points of it.
 
-    Shapes are numbered: those of the arm first, in the order of `links`, then those of `fixed`.
     There are always seven joints: the first ones, which an arm of fewer lacks, remain at 0.
     Positions of prismatic joints are in [m] where [rad] is written.
     """
 
-    chain_R: FloatArray
+    R: FloatArray
     """Rotations of the chain, shape (8, 3, 3)."""
-    chain_p: FloatArray
+    p: FloatArray
     """Translations of the chain [m], shape (8, 3); with a fourth column that holds `slides` if
     there are prismatic joints."""
     slides: FloatArray
     """Motion of each prismatic joint per unit [m/m], 0 for a revolute joint, shape (7,)."""
     coupled: FloatArray
     """Links between coupled joints, as in `Chain`, numbered from FRAMES on, shape (n, 2)."""
-    lower: FloatArray
-    """Lower joint limits [rad], shape (7,); -inf where continuous, 0 for one that remains at 0."""
-    upper: FloatArray
-    """Upper joint limits [rad], shape (7,); +inf where continuous, 0 for one that remains at 0."""
-    period: FloatArray
-    """A full turn for each continuous joint, 0 for the others [rad], shape (7,)."""
     reach: FloatArray
     """Bound on how far any point of the arm moves per unit of each joint: for a revolute one, how
     far it may be from the axis [m]; shape (7,)."""
@@ -65,6 +58,25 @@ class MotionScene(NamedTuple):
     aside: float
     """Bound on how far any point of the last links, from SEEN_FROM_TOOL on, may be from the origin
     of the first of them [m]."""
+    free_axis: FloatArray
+    """`Goals.turn`: the axis about which straight motions may rotate the tool of an arm of five
+    joints, in T, else zeros, shape (3,)."""
+
+
+class ChainLimits(NamedTuple):
+    """Limits of the joints, 0 for one that remains at 0."""
+
+    lower: FloatArray
+    """Lower joint limits [rad], shape (7,); -inf where continuous."""
+    upper: FloatArray
+    """Upper joint limits [rad], shape (7,); +inf where continuous."""
+    period: FloatArray
+    """A full turn for each continuous joint, 0 for the others [rad], shape (7,)."""
+
+
+class MotionShapes(NamedTuple):
+    """Shapes and boxes around groups of them. Those of the arm are numbered first, then `fixed`."""
+
     links: FloatArray
     """The arm's shapes, packed, in link frames, shape (n_arm, 17)."""
     link_frame: IntArray
@@ -72,12 +84,28 @@ class MotionScene(NamedTuple):
     fixed: FloatArray
     """Environment and rest of the robot, and boxes around groups of the latter, packed, in A, shape
     (n_fixed, 17)."""
-    pair: IntArray
-    """Checked pairs: shape of the arm, other shape, and link that carries the other shape, 0 if it
-    is fixed; shape (n_pairs, 3). The other link is the one nearer to the base."""
+    body: IntArray
+    """Body of each shape, shape (n_arm + n_fixed,): index among the bodies of the environment, or
+    that of a robot body plus the number of bodies of the environment."""
+    robot: int
+    """Number of the first body of the robot in `body`."""
+    boxes: IntArray
+    """Number of the arm's first box around others among its shapes, and of the first one around
+    fixed shapes among all shapes, shape (2,)."""
+    root: IntArray
+    """Box around shapes of a link in which each shape of the arm is, itself if it is in none, shape
+    (n_arm,)."""
+
+
+class ShapePairs(NamedTuple):
+    """The pairs of shapes that are checked: first those checked always, then those below others."""
+
+    members: IntArray
+    """Shape of the arm, other shape, and link that carries the other shape, 0 if it is fixed, of
+    each pair; shape (n_pairs, 3). The other link is the one nearer to the base."""
     roots: IntArray
     """Shapes of the arm in the pairs that are checked always, or all, ascending."""
-    first_pair: IntArray
+    first: IntArray
     """First pair of each shape of the arm, and the number of pairs of all, shape (n_arm + 1,).
     Pairs beyond these are below others."""
     first_moving: IntArray
@@ -93,40 +121,42 @@ class MotionScene(NamedTuple):
     """Sum of the radii of the bounding spheres of each pair [m], shape (n_pairs,)."""
     gap: FloatArray
     """Distance that each pair must keep [m], shape (n_pairs,)."""
-    body: IntArray
-    """Body of each shape, shape (n_arm + n_fixed,): index among the bodies of the environment, or
-    that of a robot body plus the number of bodies of the environment."""
+
+
+class LeafSpheres(NamedTuple):
+    """Bounding spheres of the shapes in boxes around those of a link, box by box."""
+
+    spheres: FloatArray
+    """Centre and radius of each, in the frame of the link [m], shape (4, n_leaf)."""
+    span: IntArray
+    """First and one after the last of the columns of `spheres` that are in each shape of the arm
+    that is a box in no other box, equal for others, shape (n_arm, 2)."""
+    shape: IntArray
+    """Number of each of these shapes, shape (n_leaf,)."""
+    pair: IntArray
+    """Pair of each column of `spheres` with each fixed shape, NO_PAIR if it is not checked, shape
+    (n_leaf, number of fixed shapes without boxes around others)."""
+
+
+class MotionScene(NamedTuple):
+    """One arm among fixed shapes. Frames as in `tcs.kernel.arrays`."""
+
+    chain: MotionChain
+    limits: ChainLimits
+    shapes: MotionShapes
+    pairs: ShapePairs
+    leaves: LeafSpheres
     distances: DistanceTables
     """Tables of distances of bodies of the robot."""
-    leaf: FloatArray
-    """Centre and radius of the bounding sphere of each shape in a box around those of a link, in
-    the frame of the link [m], box by box, shape (4, n_leaf)."""
-    leaves: IntArray
-    """First and one after the last of the columns of `leaf` that are in each shape of the arm that
-    is a box in no other box, equal for others, shape (n_arm, 2)."""
-    leaf_shape: IntArray
-    """Number of each of these shapes, shape (n_leaf,)."""
-    leaf_pair: IntArray
-    """Pair of each column of `leaf` with each fixed shape, NO_PAIR if it is not checked, shape
-    (n_leaf, number of fixed shapes without boxes around others)."""
-    boxes: IntArray
-    """Number of the arm's first box around others among its shapes, and of the first one around
-    fixed shapes among all shapes, shape (2,)."""
-    root: IntArray
-    """Box around shapes of a link in which each shape of the arm is, itself if it is in none, shape
-    (n_arm,)."""
-    robot: int
-    """Number of the first body of the robot in `body`."""
-    turn: FloatArray
-    """As in `Problem`: the axis about which straight motions may rotate the tool of an arm of five
-    joints, in T, else zeros, shape (3,)."""
 
 
-class MotionWorkspace(NamedTuple):
-    """Scratch of one worker, reused from curve to curve."""
+class PlacedPosture(NamedTuple):
+    """The arm at the current posture."""
 
     q: FloatArray
-    """Joint angles of the current posture [rad], shape (7,)."""
+    """Joint angles [rad], shape (7,)."""
+    number: IntArray
+    """Number of the current posture, shape (1,)."""
     turns: FloatArray
     """Scratch of `place_links`, shape (3, LANES)."""
     link_R: FloatArray
@@ -136,67 +166,102 @@ class MotionWorkspace(NamedTuple):
     """Origins of A, L1..L7 and the links between coupled joints in A [m], shape
     (8 + coupled, 3)."""
     shapes: FloatArray
-    """All shapes in A at the current posture, packed, shape (n_arm + n_fixed, 17)."""
+    """All shapes in A, packed, shape (n_arm + n_fixed, 17)."""
     placed: IntArray
     """Number of the posture for which each shape of the arm was placed, shape (n_arm,)."""
-    posture: IntArray
-    """Number of the current posture, and 1 if joints move on the current piece, `planes.TWISTED`
-    if their motion to first order is known too; shape (2,)."""
+
+
+class PieceMotion(NamedTuple):
+    """Motion on the current piece of a curve, whose middle is the current posture."""
+
+    known: IntArray
+    """1 if joints move on the piece, `planes.TWISTED` if their motion to first order is known too,
+    else 0; shape (1,)."""
     delta: FloatArray
-    """Greatest distance of each joint from the current posture on the current piece [rad],
-    shape (7,)."""
-    motion: FloatArray
-    """Bound on how far any point of a shape moves on the current piece, relative to each link
-    before its own [m], shape (n_arm, 8 + coupled)."""
-    rest: FloatArray
-    """Bound on how far any point of a shape is on the current piece from where its twist at the
-    middle posture leads to, relative to each link before its own [m], shape (n_arm, 8 + coupled).
-    """
+    """Greatest distance of each joint from the current posture [rad], shape (7,)."""
     rate: FloatArray
-    """Motion of each joint on half of the current piece, to first order [rad], shape (7,)."""
+    """Motion of each joint on half of the piece, to first order [rad], shape (7,)."""
     bend: FloatArray
     """Bound on twice the motion of each joint beyond the first order [rad], shape (7,)."""
+    motion: FloatArray
+    """Bound on how far any point of a shape moves, relative to each link before its own [m], shape
+    (n_arm, 8 + coupled)."""
+    rest: FloatArray
+    """Bound on how far any point of a shape is from where its twist at the middle posture leads to,
+    relative to each link before its own [m], shape (n_arm, 8 + coupled)."""
     twist: FloatArray
-    """Motion of the links on half of the current piece, see `planes`, shape (8 + coupled, 6)."""
+    """Motion of the links on half of the piece, see `planes`, shape (8 + coupled, 6)."""
     line: FloatArray
     """Straight motion of the tool on the current curve, see `tool_line`, shape (5,)."""
-    turn: FloatArray
+    tool_twist: FloatArray
     """Motion of the links 0 .. 7 as `twist`, but as seen from the tool on that line, shape
     (8, 6)."""
     by_tool: BoolArray
-    """Whether the first row of `rest` bounds what `turn` leaves, not `twist`, shape (n_arm,)."""
+    """Whether the first row of `rest` bounds what `tool_twist` leaves, not `twist`, shape
+    (n_arm,)."""
+
+
+class BezierCurve(NamedTuple):
+    """The current curve: cubic Bezier curves, one after the other."""
+
     control: FloatArray
-    """Control points of the pieces of the current curve, cubic Bezier curves, the last one of each
-    being the first one of the next [rad], shape (3 * MOST_PIECES + 1, 7)."""
+    """Control points, the last one of each piece being the first one of the next [rad], shape
+    (3 * MOST_PIECES + 1, 7)."""
     pieces: IntArray
-    """Number of these pieces, a power of two, shape (1,)."""
-    met: FloatArray
-    """Where on the curve the pair `contact` blocks it, in [0, 1], shape (1,)."""
+    """Number of pieces, a power of two, shape (1,)."""
+
+
+class UncertifiedPairs(NamedTuple):
+    """Pieces of the current curve that are not certified yet, and the pairs to check on them."""
+
     pairs: IntArray
-    """Lists of pairs that are not certified yet, shape (LISTED + (DEPTH + 2) * n_pairs,)."""
+    """Lists of pairs, shape (LISTED + (DEPTH + 2) * n_pairs,)."""
     stack: IntArray
     """Stack of pairs whose pairs below are checked next, shape (STACK,)."""
     span: FloatArray
     """Pieces of the curve to certify: begin and end, in [0, 1], shape (WIDE + 2 * DEPTH, 2)."""
     stretch: IntArray
     """First pair and one after the last pair of each piece in `span`, shape as `span`."""
+
+
+class Separation(NamedTuple):
+    """Scratch of the comparisons of bounding spheres and of boxes."""
+
+    apart: FloatArray
+    """Squared distance of the bounding spheres of pairs, less the square of what they must keep
+    [m^2], shape (GROUP,)."""
     excess: FloatArray
     """Squared distance of the bounding spheres of a link's shapes from the core of that shape, less
     the square of what they must keep [m^2], shape (n_leaf,)."""
     other: FloatArray
-    """The fixed shape that `leaves` compares with, in the frame of a link: its three axes, the
+    """The fixed shape that these are compared with, in the frame of a link: its three axes, the
     link's origin from its centre along them, and the half sizes of its core [m], shape (5, 3)."""
-    apart: FloatArray
-    """Squared distance of the bounding spheres of pairs, less the square of what they must keep
-    [m^2], shape (GROUP,)."""
     between: FloatArray
     """Axes of a link's frame and its origin along the axes of boxes around fixed shapes, and these
     axes in A, see `group_boxes`, shape (3, 7)."""
-    contact: IntArray
-    """The pair found in contact last, -1 for none, shape (1,)."""
+
+
+class FoundContacts(NamedTuple):
+    """Pairs found in contact."""
+
+    pair: IntArray
+    """The pair found last, NO_PAIR for none, shape (1,)."""
+    met: FloatArray
+    """Where on the curve that pair blocks it, in [0, 1], shape (1,)."""
     hits: IntArray
     """How often pairs of each two bodies blocked a curve, shape (n_bodies, n_bodies): that of the
     arm's shape first."""
+
+
+class MotionWorkspace(NamedTuple):
+    """Scratch of one worker, reused from curve to curve."""
+
+    posture: PlacedPosture
+    piece: PieceMotion
+    curve: BezierCurve
+    uncertified: UncertifiedPairs
+    separation: Separation
+    contacts: FoundContacts
 
 
 def motion_scene(problem: Problem, row: Rows) -> MotionScene:
@@ -240,36 +305,44 @@ def torso_scene(problem: Problem, torso: int) -> MotionScene:
     farthest = _farthest(problem, links, link_frame)
     reach = np.where(slides > 0.0, slides, farthest)
     return MotionScene(
-        chain_R=problem.chain.R,
-        chain_p=problem.chain.p,
-        slides=slides,
-        coupled=problem.chain.coupled,
-        lower=lower,
-        upper=upper,
-        period=np.where(np.isfinite(lower) & np.isfinite(upper), 0.0, FULL_TURN),
-        reach=reach,
-        weight=(reach / reach.max()) ** 2,
-        aside=float(farthest[SEEN_FROM_TOOL - 1]),
-        links=links,
-        link_frame=link_frame,
-        fixed=fixed,
-        body=np.concatenate(
-            [
-                problem.links.body + problem.environment.bodies,
-                problem.environment.body,
-                problem.body.body + problem.environment.bodies,
-            ]
+        chain=MotionChain(
+            R=problem.chain.R,
+            p=problem.chain.p,
+            slides=slides,
+            coupled=problem.chain.coupled,
+            reach=reach,
+            weight=(reach / reach.max()) ** 2,
+            aside=float(farthest[SEEN_FROM_TOOL - 1]),
+            free_axis=problem.goals.turn,
+        ),
+        limits=ChainLimits(
+            lower=lower,
+            upper=upper,
+            period=np.where(np.isfinite(lower) & np.isfinite(upper), 0.0, FULL_TURN),
+        ),
+        shapes=MotionShapes(
+            links=links,
+            link_frame=link_frame,
+            fixed=fixed,
+            body=np.concatenate(
+                [
+                    problem.links.body + problem.environment.bodies,
+                    problem.environment.body,
+                    problem.body.body + problem.environment.bodies,
+                ]
+            ),
+            robot=problem.environment.bodies,
+            boxes=np.array([count, count + len(fixed)]),
+            root=np.arange(count),
+        ),
+        pairs=shape_pairs(links, fixed, pair, gaps[arm, other]),
+        leaves=LeafSpheres(
+            spheres=np.zeros((4, 0)),
+            span=np.zeros((count, 2), np.int64),
+            shape=np.zeros(0, np.int64),
+            pair=np.zeros((0, len(fixed)), np.int64),
         ),
         distances=problem.distances,
-        leaf=np.zeros((4, 0)),
-        leaves=np.zeros((count, 2), np.int64),
-        boxes=np.array([count, count + len(fixed)]),
-        root=np.arange(count),
-        leaf_shape=np.zeros(0, np.int64),
-        leaf_pair=np.zeros((0, len(fixed)), np.int64),
-        robot=problem.environment.bodies,
-        turn=problem.goals.turn,
-        **pair_fields(links, fixed, pair, gaps[arm, other]),
     )
 
 
@@ -282,11 +355,13 @@ def placed(scene: MotionScene, problem: Problem, row: Rows) -> MotionScene:
         problem: The scene.
         row: The configuration.
     """
+    shapes, pairs = scene.shapes, scene.pairs
     R_WA, p_WA = arm_base(problem, row)
     environment = moved_shapes(problem.environment.shapes[row.state[0]], R_WA.T, -R_WA.T @ p_WA)
-    fixed = np.concatenate([environment, scene.fixed[len(environment) :]])
-    always = scene.pair[: scene.first_pair[-1]]
-    return scene._replace(fixed=fixed, centre=_centres(always, len(scene.links), fixed))
+    fixed = np.concatenate([environment, shapes.fixed[len(environment) :]])
+    always = pairs.members[: pairs.first[-1]]
+    centre = _centres(always, len(shapes.links), fixed)
+    return scene._replace(shapes=shapes._replace(fixed=fixed), pairs=pairs._replace(centre=centre))
 
 
 def arm_base(problem: Problem, row: Rows) -> tuple[FloatArray, FloatArray]:
@@ -318,19 +393,20 @@ def carriers(problem: Problem) -> IntArray:
 
 def with_pairs(scene: MotionScene, kept: BoolArray | IntArray) -> MotionScene:
     """Return a scene with some of its pairs only, those `kept`: a mask or ascending numbers."""
-    fields = pair_fields(scene.links, scene.fixed, scene.pair[kept], scene.gap[kept])
-    return scene._replace(**fields)
+    shapes, pairs = scene.shapes, scene.pairs
+    some = shape_pairs(shapes.links, shapes.fixed, pairs.members[kept], pairs.gap[kept])
+    return scene._replace(pairs=some)
 
 
-def pair_fields(
+def shape_pairs(
     links: FloatArray,
     fixed: FloatArray,
     pair: IntArray,
     gap: FloatArray,
     below: IntArray | None = None,
     top: int | None = None,
-) -> dict[str, Any]:
-    """Return the fields of a scene that describe its pairs.
+) -> ShapePairs:
+    """Return the pairs of a scene.
 
     Args:
         links: The arm's shapes, packed, shape (n_arm, 17).
@@ -349,54 +425,68 @@ def pair_fields(
     if below is not None:
         roots = np.union1d(always[:, 0], always[of_two_links, 1])
     radius = np.concatenate([links[:, BOUND], fixed[:, BOUND]])
-    return {
-        "pair": np.ascontiguousarray(pair),
-        "roots": roots.astype(np.int64),
-        "below": np.zeros((0, 2), np.int64) if below is None else below,
-        "first_pair": first_pair,
-        "first_moving": first_pair[:-1] + fixed_pairs,
-        "gap": np.ascontiguousarray(gap),
-        "centre": _centres(always, len(links), fixed),
-        "bound": radius[pair[:, 0]] + radius[pair[:, 1]],
-    }
+    return ShapePairs(
+        members=np.ascontiguousarray(pair),
+        roots=roots.astype(np.int64),
+        first=first_pair,
+        first_moving=first_pair[:-1] + fixed_pairs,
+        below=np.zeros((0, 2), np.int64) if below is None else below,
+        centre=_centres(always, len(links), fixed),
+        bound=radius[pair[:, 0]] + radius[pair[:, 1]],
+        gap=np.ascontiguousarray(gap),
+    )
 
 
 def new_motion_workspace(scene: MotionScene) -> MotionWorkspace:
     """Return scratch memory for one worker."""
-    arm, pairs, bodies = len(scene.links), len(scene.pair), int(scene.body.max()) + 1
-    frames = FRAMES + len(scene.coupled)
-    shapes = np.zeros((arm + len(scene.fixed), COLUMNS))
-    shapes[arm:] = scene.fixed
+    arm, pairs, bodies = (
+        len(scene.shapes.links),
+        len(scene.pairs.members),
+        int(scene.shapes.body.max()) + 1,
+    )
+    frames = FRAMES + len(scene.chain.coupled)
+    shapes = np.zeros((arm + len(scene.shapes.fixed), COLUMNS))
+    shapes[arm:] = scene.shapes.fixed
     return MotionWorkspace(
-        q=np.empty(7),
-        turns=np.zeros((3, LANES)),
-        link_R=np.empty((frames, 3, 3)),
-        link_p=np.empty((frames, 3)),
-        shapes=shapes,
-        placed=np.zeros(arm, np.int64),
-        posture=np.zeros(2, np.int64),
-        delta=np.zeros(7),
-        motion=np.zeros((arm, frames)),
-        rest=np.zeros((arm, frames)),
-        rate=np.zeros(7),
-        bend=np.zeros(7),
-        twist=np.zeros((frames, 6)),
-        line=np.array([0.0, 0.0, 0.0, np.inf, 0.0]),
-        turn=np.zeros((8, 6)),
-        by_tool=np.zeros(arm, np.bool_),
-        control=np.empty((3 * MOST_PIECES + 1, 7)),
-        pieces=np.ones(1, np.int64),
-        met=np.zeros(1),
-        pairs=np.empty(LISTED + (DEPTH + 2) * pairs, np.int64),
-        stack=np.empty(STACK, np.int64),
-        span=np.empty((WIDE + 2 * DEPTH, 2)),
-        stretch=np.empty((WIDE + 2 * DEPTH, 2), np.int64),
-        excess=np.empty(scene.leaf.shape[1]),
-        other=np.empty((5, 3)),
-        apart=np.empty(GROUP),
-        between=np.empty((3, 7)),
-        contact=np.full(1, NO_PAIR, np.int64),
-        hits=np.zeros((bodies, bodies), np.int64),
+        posture=PlacedPosture(
+            q=np.empty(7),
+            number=np.zeros(1, np.int64),
+            turns=np.zeros((3, LANES)),
+            link_R=np.empty((frames, 3, 3)),
+            link_p=np.empty((frames, 3)),
+            shapes=shapes,
+            placed=np.zeros(arm, np.int64),
+        ),
+        piece=PieceMotion(
+            known=np.zeros(1, np.int64),
+            delta=np.zeros(7),
+            rate=np.zeros(7),
+            bend=np.zeros(7),
+            motion=np.zeros((arm, frames)),
+            rest=np.zeros((arm, frames)),
+            twist=np.zeros((frames, 6)),
+            line=np.array([0.0, 0.0, 0.0, np.inf, 0.0]),
+            tool_twist=np.zeros((8, 6)),
+            by_tool=np.zeros(arm, np.bool_),
+        ),
+        curve=BezierCurve(control=np.empty((3 * MOST_PIECES + 1, 7)), pieces=np.ones(1, np.int64)),
+        uncertified=UncertifiedPairs(
+            pairs=np.empty(LISTED + (DEPTH + 2) * pairs, np.int64),
+            stack=np.empty(STACK, np.int64),
+            span=np.empty((WIDE + 2 * DEPTH, 2)),
+            stretch=np.empty((WIDE + 2 * DEPTH, 2), np.int64),
+        ),
+        separation=Separation(
+            apart=np.empty(GROUP),
+            excess=np.empty(scene.leaves.spheres.shape[1]),
+            other=np.empty((5, 3)),
+            between=np.empty((3, 7)),
+        ),
+        contacts=FoundContacts(
+            pair=np.full(1, NO_PAIR, np.int64),
+            met=np.zeros(1),
+            hits=np.zeros((bodies, bodies), np.int64),
+        ),
     )
 
 

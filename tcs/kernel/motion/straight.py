@@ -71,7 +71,7 @@ class StraightSearch(NamedTuple):
     outcomes: IntArray
     """How often a motion ended in each way: DONE, LIMITS or BLOCKED, shape (3,)."""
     contacts: IntArray
-    """How often two bodies touch at these postures, shape as that of `MotionWorkspace.hits`."""
+    """How often two bodies touch at these postures, shape as that of `FoundContacts.hits`."""
 
 
 @jit
@@ -106,7 +106,7 @@ def straight_motion(
 
     Args:
         owned_scene: The scene.
-        owned_work: Scratch; `contact` is the pair that blocks the motion if one does.
+        owned_work: Scratch; `contacts.pair` is the pair that blocks the motion if one does.
         owned_line: Scratch.
         q: Joint angles to start from [rad], shape (7,).
         offset: Motion of the tool from the first posture to the last, in A [m], shape (3,).
@@ -152,8 +152,11 @@ def next_straight(
     for n in range(first, len(search.q)):
         q = search.q[n]
         if not posture_is_free(scene, work, q):
-            i, j = scene.pair[work.contact[0], 0], scene.pair[work.contact[0], 1]
-            search.contacts[scene.body[i], scene.body[j]] += 1
+            i, j = (
+                scene.pairs.members[work.contacts.pair[0], 0],
+                scene.pairs.members[work.contacts.pair[0], 1],
+            )
+            search.contacts[scene.shapes.body[i], scene.shapes.body[j]] += 1
             continue
         outcome = _lead(scene, work, line, q, search.offset, search.fastest, points, tangents)
         search.outcomes[outcome] += 1
@@ -174,9 +177,10 @@ def _lead(
     tangents: FloatArray,
 ) -> int:
     """Do as `straight_motion`."""
+    chain = scene.chain
     newton, last = line.newton, len(points) - 1
-    place_links(scene.chain_R, scene.chain_p, q, line.turns, newton.link_R, newton.link_p)
-    place_tool(scene.chain_R, scene.chain_p, newton.link_R, newton.link_p, line.R_AT, line.p_AT)
+    place_links(chain.R, chain.p, q, line.turns, newton.link_R, newton.link_p)
+    place_tool(chain.R, chain.p, newton.link_R, newton.link_p, line.R_AT, line.p_AT)
     release_joints(scene, line)
     for k in range(7):
         points[0, k] = q[k]
@@ -211,7 +215,7 @@ def release_joints(scene: MotionScene, line: StraightWorkspace) -> None:
     """Lock no joint but those that the arm lacks and that do not stand for another."""
     for k in range(7):
         is_turn = k == 0 and may_turn(scene)
-        line.locked[k] = 1 if scene.lower[k] == scene.upper[k] and not is_turn else 0
+        line.locked[k] = 1 if scene.limits.lower[k] == scene.limits.upper[k] and not is_turn else 0
 
 
 @inner
@@ -221,14 +225,14 @@ def take_pieces(
     """Make some pieces of a spline the current curve.
 
     Args:
-        work: `control` and `pieces` are filled.
+        work: `curve` is filled.
         points: Joint angles [rad], shape (n + 1, 7).
         tangents: Their derivatives by the fraction of the spline [rad], shape (n + 1, 7).
         first: Number of the first piece.
         count: Number of pieces, a power of two.
     """
-    control, third = work.control, 1.0 / (3.0 * (len(points) - 1))
-    work.pieces[0] = count
+    control, third = work.curve.control, 1.0 / (3.0 * (len(points) - 1))
+    work.curve.pieces[0] = count
     for m in range(count):
         n, at = first + m, 3 * m
         for k in range(7):
@@ -252,7 +256,7 @@ def error_between(
     fraction: float,
 ) -> float:
     """Return the error of the tool in the middle of the current curve [rad and m]."""
-    c = work.control
+    c = work.curve.control
     for k in range(7):
         line.q[k] = 0.125 * (c[0, k] + c[3, k]) + 0.375 * (c[1, k] + c[2, k])
     for r in range(3):
@@ -263,9 +267,10 @@ def error_between(
 @inner
 def _error_on_line(scene: MotionScene, line: StraightWorkspace, q: FloatArray) -> float:
     """Fill link poses and pose error at joint angles q; return the error [rad and m]."""
+    chain = scene.chain
     newton = line.newton
-    place_links(scene.chain_R, scene.chain_p, q, line.turns, newton.link_R, newton.link_p)
-    place_tool(scene.chain_R, scene.chain_p, newton.link_R, newton.link_p, newton.R_AT, newton.p_AT)
+    place_links(chain.R, chain.p, q, line.turns, newton.link_R, newton.link_p)
+    place_tool(chain.R, chain.p, newton.link_R, newton.link_p, newton.R_AT, newton.p_AT)
     worst = pose_error(newton.R_AT, newton.p_AT, line.R_AT, line.target, newton.error)
     return _without_turn(scene, line) if may_turn(scene) else worst
 
@@ -289,7 +294,7 @@ def _without_turn(scene: MotionScene, line: StraightWorkspace) -> float:
 @inner
 def _turn_in_base(scene: MotionScene, R: FloatArray, r: int) -> float:
     """Return a component in A of the axis about which a tool, at orientation R, may rotate."""
-    turn = scene.turn
+    turn = scene.chain.free_axis
     return R[r, 0] * turn[0] + R[r, 1] * turn[1] + R[r, 2] * turn[2]
 
 
@@ -298,7 +303,7 @@ def evaluate_on_line(scene: MotionScene, line: StraightWorkspace, q: FloatArray)
     """Fill pose error and Jacobian at joint angles q, with the columns of locked joints at 0."""
     newton, error = line.newton, _error_on_line(scene, line, q)
     fill_jacobian(newton.link_R, newton.link_p, newton.p_AT, newton.J)
-    fill_sliding(scene.chain_p, newton.link_R, newton.J)
+    fill_sliding(scene.chain.p, newton.link_R, newton.J)
     for k in range(7):
         if line.locked[k] == 1:
             for i in range(6):
@@ -322,6 +327,7 @@ def next_on_line(
 
     A joint that would exceed a limit is set to it and locked, and the posture solved again.
     """
+    limits = scene.limits
     for r in range(3):
         line.target[r] = line.p_AT[r] + fraction * offset[r]
     for k in range(7):
@@ -344,7 +350,7 @@ def next_on_line(
         locked = 0
         for k in range(7):
             square += (line.q[k] - before[k]) ** 2
-            over = max(line.q[k] - scene.upper[k], scene.lower[k] - line.q[k])
+            over = max(line.q[k] - limits.upper[k], limits.lower[k] - line.q[k])
             if over > worst:
                 worst, beyond = over, k
             locked += line.locked[k]
@@ -355,7 +361,7 @@ def next_on_line(
         if locked >= MOST_LOCKED:
             return False
         line.locked[beyond] = 1
-        low, high = scene.lower[beyond], scene.upper[beyond]
+        low, high = limits.lower[beyond], limits.upper[beyond]
         after[beyond] = low if line.q[beyond] < low else high
     for k in range(7):
         after[k] = line.q[k]
@@ -391,13 +397,14 @@ def keep_within_limits(scene: MotionScene, points: FloatArray, tangents: FloatAr
     Points have one on either side, the first and the last on one side: a motion may begin or end at
     a limit.
     """
+    limits = scene.limits
     last = len(points) - 1
     steps = 3.0 * last
     for n in range(last + 1):
         for k in range(7):
-            if scene.period[k] == 0.0:
-                below = steps * max(points[n, k] - scene.lower[k], 0.0)
-                above = steps * max(scene.upper[k] - points[n, k], 0.0)
+            if limits.period[k] == 0.0:
+                below = steps * max(points[n, k] - limits.lower[k], 0.0)
+                above = steps * max(limits.upper[k] - points[n, k], 0.0)
                 most = above if n == 0 else (below if n == last else min(below, above))
                 least = below if n == 0 else (above if n == last else min(below, above))
                 tangents[n, k] = min(max(tangents[n, k], -least), most)

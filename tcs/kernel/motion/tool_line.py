@@ -30,22 +30,22 @@ EXCESS = 1e-6
 """Excess of the errors [rad and m]: far above that of the points of a spline, and of the sine of an
 angle in place of the angle."""
 OFF, TURNED = 3, 4
-"""In `MotionWorkspace.line`, after the motion in A [m]: bounds on the error of the motion of points
+"""In `PieceMotion.line`, after the motion in A [m]: bounds on the error of the motion of points
 of the last links fixed to the tool [m], inf if the tool follows no line; and on the rotation of the
 tool from its orientation on the line [rad]."""
 
 
 @inner
 def may_turn(scene: MotionScene) -> bool:
-    """Return whether straight motions may rotate the tool about `scene.turn`."""
-    turn = scene.turn
+    """Return whether straight motions may rotate the tool about `scene.chain.free_axis`."""
+    turn = scene.chain.free_axis
     return bool(turn[0] != 0.0 or turn[1] != 0.0 or turn[2] != 0.0)
 
 
 @inner
 def follows_line(work: MotionWorkspace) -> bool:
     """Return whether the tool follows a line on the current curve."""
-    return work.line[OFF] < np.inf
+    return work.piece.line[OFF] < np.inf
 
 
 @inner
@@ -56,34 +56,36 @@ def off_line(work: MotionWorkspace, moved: float) -> float:
         work: The tool follows a line.
         moved: Bound on the motion of the point relative to the tool [m].
     """
-    return work.line[OFF] + work.line[TURNED] * moved
+    return work.piece.line[OFF] + work.piece.line[TURNED] * moved
 
 
 @inner
 def line_motion(work: MotionWorkspace) -> float:
     """Return the length of the line on half of the current piece [m]."""
-    x, y, z = work.turn[7, 3], work.turn[7, 4], work.turn[7, 5]
+    piece = work.piece
+    x, y, z = piece.tool_twist[7, 3], piece.tool_twist[7, 4], piece.tool_twist[7, 5]
     return np.sqrt(x * x + y * y + z * z)
 
 
 @inner
 def take_turns(scene: MotionScene, work: MotionWorkspace, half: float) -> None:
-    """Fill `turn`, as `planes.take_twists` does `twist`.
+    """Fill `piece.tool_twist`, as `planes.take_twists` does `twist`.
 
     Args:
         scene: The scene.
         work: The tool follows a line.
         half: Half of the length of the piece, as a fraction of the curve.
     """
-    turn, line = work.turn, work.line
+    piece = work.piece
+    turn, line = piece.tool_twist, piece.line
     for m in range(3):
         turn[7, m], turn[7, 3 + m] = 0.0, half * line[m]
     for k in range(6, SEEN_FROM_TOOL - 1, -1):
-        R, p, rate = work.link_R[k + 1], work.link_p[k + 1], work.rate[k]
-        if scene.slides[k] > 0.0:
+        R, p, rate = work.posture.link_R[k + 1], work.posture.link_p[k + 1], piece.rate[k]
+        if scene.chain.slides[k] > 0.0:
             for r in range(3):
                 turn[k, r] = turn[k + 1, r]
-                turn[k, 3 + r] = turn[k + 1, 3 + r] - scene.slides[k] * rate * R[r, 2]
+                turn[k, 3 + r] = turn[k + 1, 3 + r] - scene.chain.slides[k] * rate * R[r, 2]
             continue
         x, y, z = rate * R[0, 2], rate * R[1, 2], rate * R[2, 2]
         turn[k, 0], turn[k, 1], turn[k, 2] = (
@@ -111,7 +113,7 @@ def take_line(
 
     Args:
         scene: The scene.
-        work: `line` is filled.
+        work: `piece.line` is filled.
         offset: Motion of the tool on the whole curve, in A [m], shape (3,).
         points: Joint angles of the spline [rad], shape (n + 1, 7).
         tangents: Their derivatives by the fraction of the spline [rad], shape (n + 1, 7).
@@ -120,15 +122,17 @@ def take_line(
         turned: Greatest rotation from its orientation there [rad].
     """
     if may_turn(scene):
-        work.line[OFF] = np.inf
+        work.piece.line[OFF] = np.inf
         return
     pieces = len(points) - 1
-    chain, aside = 0.0, scene.aside
+    chain, aside = 0.0, scene.chain.aside
     for k in range(1, 7):
-        p = scene.chain_p[k]
+        p = scene.chain.p[k]
         length = np.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
-        if scene.slides[k] > 0.0:
-            length += scene.slides[k] * max(abs(scene.lower[k]), abs(scene.upper[k]))
+        if scene.chain.slides[k] > 0.0:
+            length += scene.chain.slides[k] * max(
+                abs(scene.limits.lower[k]), abs(scene.limits.upper[k])
+            )
         chain += length
         if k >= SEEN_FROM_TOOL:
             aside += length
@@ -147,7 +151,7 @@ def take_line(
         for n in range(pieces + 1):
             d = max(d, abs(tangents[n, k] - slopes[n, k]) / pieces)
         # A prismatic joint moves points no more than a rotation at the length of the arm would.
-        scale = scene.slides[k] / (chain + aside) if scene.slides[k] > 0.0 else 1.0
+        scale = scene.chain.slides[k] / (chain + aside) if scene.chain.slides[k] > 0.0 else 1.0
         first, second = first + scale * a, second + scale * b
         third, changed = third + scale * c, changed + scale * d
     square = first * first
@@ -156,7 +160,7 @@ def take_line(
     # Other derivatives at the ends of a piece move its points by a quarter of them at most, and so
     # they do at its middle.
     per_length = BEYOND * bell + 0.5 * changed
-    line = work.line
+    line = work.piece.line
     for m in range(3):
         line[m] = offset[m]
     line[TURNED] = turned + per_length + EXCESS

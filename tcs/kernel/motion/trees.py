@@ -95,7 +95,7 @@ def new_trees(seed: int) -> Trees:
 @inner
 def difference(scene: MotionScene, start: float, end: float, k: int) -> float:
     """Return the angle of joint k from one position to another, the short way round [rad]."""
-    period = scene.period[k]
+    period = scene.limits.period[k]
     angle = end - start
     if period > 0.0:
         angle -= period * np.floor(angle / period + 0.5)
@@ -105,7 +105,7 @@ def difference(scene: MotionScene, start: float, end: float, k: int) -> float:
 @inner
 def unwound(scene: MotionScene, start: float, end: float, k: int) -> float:
     """Return the position of joint k nearest to `start` that equals `end` up to full turns."""
-    period = scene.period[k]
+    period = scene.limits.period[k]
     return end - period * np.floor((end - start) / period + 0.5) if period > 0.0 else end
 
 

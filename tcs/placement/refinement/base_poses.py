@@ -58,7 +58,7 @@ def joint_path(problem: Problem, row: Rows, through: FloatArray | None = None) -
         return None
     motion = motion_scene(problem, row)
     work = new_motion_workspace(motion)
-    periodic = motion.period > 0.0
+    periodic = motion.limits.period > 0.0
     costs = [_costs(a, b, periodic) for a, b in itertools.pairwise(layers)]
     for _ in range(ATTEMPTS):
         rows = _cheapest(costs)

@@ -17,9 +17,9 @@ from tests.reference.kinematics import link_poses
 def needed_at(problem, torso):
     """Return the pairs of the robot's own shapes that can touch at a torso level."""
     scene = torso_scene(problem, torso)
-    own = scene.body[scene.pair[:, 1]] >= problem.environment.bodies
+    own = scene.shapes.body[scene.pairs.members[:, 1]] >= problem.environment.bodies
     needed = needed_pairs(scene, own) & own
-    return set(map(tuple, scene.pair[needed, :2].tolist()))
+    return set(map(tuple, scene.pairs.members[needed, :2].tolist()))
 
 
 def test_pairs_that_touch_at_another_torso_level_are_kept():
@@ -37,5 +37,5 @@ def test_pairs_that_touch_at_another_torso_level_are_kept():
     first, second = needed_at(problem, 0), needed_at(problem, 1)
     assert second - first
     scene = approach_scene(problem).motion
-    kept = set(map(tuple, scene.pair[:, :2].tolist()))
+    kept = set(map(tuple, scene.pairs.members[:, :2].tolist()))
     assert first | second <= kept

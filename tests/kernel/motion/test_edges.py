@@ -63,10 +63,10 @@ def test_certified_curves_are_free_and_others_blocked_where_it_is_reported(chain
             free += 1
             continue
         blocked += 1
-        pair = work.contact[0]
-        near = scene._replace(gap=scene.gap + NEAR)
+        pair = work.contacts.pair[0]
+        near = scene._replace(pairs=scene.pairs._replace(gap=scene.pairs.gap + NEAR))
         assert posture_contact(near, work, point_on_curve(control, until)) >= 0
-        assert 0 <= pair < len(scene.pair)
+        assert 0 <= pair < len(scene.pairs.members)
 
 
 def test_the_reference_finds_certified_curves_free(chain, rng):

@@ -55,7 +55,7 @@ def drawn(rng, chain):
 def test_postures_and_certified_curves_are_free_by_the_reference(name, rng):
     chain, scene = driving_scene(name)
     ready, work, plain = prepared(scene)
-    assert {0, FRAMES, FRAMES + 1} <= set(ready.pair[:, 2])
+    assert {0, FRAMES, FRAMES + 1} <= set(ready.pairs.members[:, 2])
     found, free = [], 0
     for _ in range(60):
         q = drawn(rng, chain)
@@ -81,7 +81,7 @@ def test_shapes_with_a_plane_between_them_do_not_meet(name, rng):
     # Every pair counts here, those that never touch too.
     ready = motion_scene(build_problem(scene), rows_at(toy_grid(), [HERE]))
     work = new_motion_workspace(ready)
-    plane, meets = np.zeros((2, len(ready.pair)), np.bool_)
+    plane, meets = np.zeros((2, len(ready.pairs.members)), np.bool_)
     counts = np.zeros((2, 2), np.int64)
     for _ in range(60):
         q = drawn(rng, chain)
@@ -90,7 +90,7 @@ def test_shapes_with_a_plane_between_them_do_not_meet(name, rng):
         meets[:] = False
         judge(ready, work, control, plane, meets)
         assert not np.any(plane & meets)
-        between = ready.pair[:, 2] >= FRAMES
+        between = ready.pairs.members[:, 2] >= FRAMES
         for n, which in enumerate((between, ~between)):
             counts[n] += np.count_nonzero(plane[which]), np.count_nonzero(meets[which])
     assert np.all(counts > 20)
@@ -104,7 +104,7 @@ def test_the_tool_stays_on_a_line_from_any_of_its_postures(name, rng):
         scene = scene._replace(freedom=np.repeat(TURN.row()[None], 5, axis=0))
     ready, work, _ = prepared(scene._replace(arm_vs_environment=np.zeros((6, 1), bool)))
     problem, done = build_problem(scene), 0
-    axis = ready.turn if chain.joints == 5 else None
+    axis = ready.chain.free_axis if chain.joints == 5 else None
     for _ in range(100):
         R0, p0 = link_poses(chain, drawn(rng, chain))[-1]
         for q in postures_at(problem, R0, p0, 0, may_turn=True):

@@ -30,17 +30,25 @@ def random_box(rng, row):
 
 def test_a_face_separates_boxes_that_are_apart_and_no_others(rng):
     scene, work, _ = toy(drake_arm("pr2 left").chain, 0)
-    i, j = 0, len(scene.links)
-    frame, outcomes = scene.link_frame[i], []
+    i, j = 0, len(scene.shapes.links)
+    frame, outcomes = scene.shapes.link_frame[i], []
     for _ in range(4000):
-        random_box(rng, scene.links[i])
-        random_box(rng, work.shapes[j])
-        scene.links[i, ROTATION:] = np.eye(3).ravel()
-        work.shapes[j, ROTATION:] = rotation(rng).ravel()
-        work.link_R[frame], work.link_p[frame] = rotation(rng), rng.uniform(-0.3, 0.3, 3)
-        first = corners(scene.links[i][None])[0] @ work.link_R[frame].T + work.link_p[frame]
-        second = corners(work.shapes[j][None])[0]
-        normals = np.concatenate([work.link_R[frame], work.shapes[j, ROTATION:].reshape(3, 3)], 1)
+        random_box(rng, scene.shapes.links[i])
+        random_box(rng, work.posture.shapes[j])
+        scene.shapes.links[i, ROTATION:] = np.eye(3).ravel()
+        work.posture.shapes[j, ROTATION:] = rotation(rng).ravel()
+        work.posture.link_R[frame], work.posture.link_p[frame] = (
+            rotation(rng),
+            rng.uniform(-0.3, 0.3, 3),
+        )
+        first = (
+            corners(scene.shapes.links[i][None])[0] @ work.posture.link_R[frame].T
+            + work.posture.link_p[frame]
+        )
+        second = corners(work.posture.shapes[j][None])[0]
+        normals = np.concatenate(
+            [work.posture.link_R[frame], work.posture.shapes[j, ROTATION:].reshape(3, 3)], 1
+        )
         a, b = first @ normals, second @ normals
         gap = np.max(np.maximum(a.min(axis=0) - b.max(axis=0), b.min(axis=0) - a.max(axis=0)))
         distance = rng.choice([0.0, 0.05])

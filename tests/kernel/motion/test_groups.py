@@ -77,8 +77,8 @@ def extremes(row):
 
 
 def test_boxes_enclose_the_shapes_in_them(plain):
-    count = len(plain.links)
-    groups = boxes_around(plain.links, plain.link_frame, plain.body[:count])
+    count = len(plain.shapes.links)
+    groups = boxes_around(plain.shapes.links, plain.shapes.link_frame, plain.shapes.body[:count])
     assert len(groups.rows) > count
     for box in range(count, len(groups.rows)):
         members, shapes = [box], []
@@ -96,22 +96,28 @@ def test_boxes_enclose_the_shapes_in_them(plain):
 
 def test_every_pair_of_shapes_is_below_a_pair_that_is_checked(plain):
     scene = grouped(plain)
-    alone = scene.below[:, 0] == scene.below[:, 1]
-    added = len(scene.links) - len(plain.links)
+    alone = scene.pairs.below[:, 0] == scene.pairs.below[:, 1]
+    added = len(scene.shapes.links) - len(plain.shapes.links)
     assert added > 0
 
     def named(pair, count, shift):
         fixed = pair[:, 1] >= count
         return set(zip(pair[:, 0].tolist(), (pair[:, 1] - shift * fixed).tolist(), strict=True))
 
-    found = named(scene.pair[alone], len(scene.links), added)
-    assert found == named(plain.pair, len(plain.links), 0)
-    seen = list(range(scene.first_pair[-1]))
+    found = named(scene.pairs.members[alone], len(scene.shapes.links), added)
+    assert found == named(plain.pairs.members, len(plain.shapes.links), 0)
+    seen = list(range(scene.pairs.first[-1]))
     for k in seen:
-        seen += range(*scene.below[k])
-    assert sorted(seen) == list(range(len(scene.pair)))
-    bodies = {(int(scene.body[i]), int(scene.body[j])) for i, j in scene.pair[alone, :2]}
-    assert bodies == {(int(plain.body[i]), int(plain.body[j])) for i, j in plain.pair[:, :2]}
+        seen += range(*scene.pairs.below[k])
+    assert sorted(seen) == list(range(len(scene.pairs.members)))
+    bodies = {
+        (int(scene.shapes.body[i]), int(scene.shapes.body[j]))
+        for i, j in scene.pairs.members[alone, :2]
+    }
+    assert bodies == {
+        (int(plain.shapes.body[i]), int(plain.shapes.body[j]))
+        for i, j in plain.pairs.members[:, :2]
+    }
 
 
 def test_postures_and_curves_are_judged_as_without_groups(plain, chain, rng):
@@ -153,12 +159,16 @@ def test_a_scene_is_placed_at_every_configuration(many, chain, rng):
 
 def shapes_in(scene, box):
     """Return the shapes of the arm or around it that are in a box around fixed shapes."""
-    below = [k for k in np.flatnonzero(scene.pair[:, 1] == box) if np.ptp(scene.below[k]) > 0]
+    below = [
+        k
+        for k in np.flatnonzero(scene.pairs.members[:, 1] == box)
+        if np.ptp(scene.pairs.below[k]) > 0
+    ]
     members = []
     while below:
         k = below.pop()
-        below += range(*scene.below[k])
-        members += [] if np.ptp(scene.below[k]) else [int(scene.pair[k, 1])]
+        below += range(*scene.pairs.below[k])
+        members += [] if np.ptp(scene.pairs.below[k]) else [int(scene.pairs.members[k, 1])]
     return set(members)
 
 
@@ -181,16 +191,16 @@ def test_shapes_of_the_base_are_in_boxes_at_every_torso_level(many, chain, rng):
     )
     problem = build_problem(scene)
     lines = approach_scene(problem)
-    arm = len(lines.motion.links)
+    arm = len(lines.motion.shapes.links)
     shift = arm + problem.environment.body.size
     first = shift + len(problem.body.body)
-    assert first < arm + len(lines.motion.fixed)
+    assert first < arm + len(lines.motion.shapes.fixed)
     assert len(problem.arm_base.R) > 1
-    for n in range(first, arm + len(lines.motion.fixed)):
+    for n in range(first, arm + len(lines.motion.shapes.fixed)):
         members = [i - shift for i in shapes_in(lines.motion, n)]
         assert members
         for torso in range(len(problem.arm_base.R)):
-            still = lines.motion.fixed[n - arm]
+            still = lines.motion.shapes.fixed[n - arm]
             box = np.concatenate([lines.moved[torso, lines.moving == n], still[None]])[0]
             for row in problem.body.shapes_A[torso, members]:
                 beyond = (extremes(row) - box[CENTRE : CENTRE + 3]) @ box[ROTATION:].reshape(3, 3)
@@ -217,33 +227,33 @@ def test_an_arm_of_few_shapes_is_left_as_it_is(chain):
 def test_the_motion_of_shapes_in_boxes_is_bounded(many, chain, rng):
     """Of all links before their own, as pairs of two links need it."""
     scene = grouped(motion_scene(build_problem(many), rows_at(toy_grid(), [HERE])))
-    assert np.count_nonzero(scene.root != np.arange(len(scene.root))) > 50
+    assert np.count_nonzero(scene.shapes.root != np.arange(len(scene.shapes.root))) > 50
     work, closer = new_motion_workspace(scene), []
     for _ in range(12):
         start = within_limits(rng, chain)
         control = start + np.linspace(0.0, 1.0, 4)[:, None] * rng.normal(size=7) * 0.1
         control[1:3] += rng.normal(size=(2, 7)) * 0.01
         place(scene, work, control, 0.5, 0.5)
-        bound = work.motion.copy()
-        middle, frames = corners(work.shapes[: len(scene.links)]), poses(work)
-        moved = np.zeros((len(scene.links), 8))
+        bound = work.piece.motion.copy()
+        middle, frames = corners(work.posture.shapes[: len(scene.shapes.links)]), poses(work)
+        moved = np.zeros((len(scene.shapes.links), 8))
         for t in np.linspace(0.0, 1.0, 11):
             place(scene, work, control, t, 0.0)
-            here, now = corners(work.shapes[: len(scene.links)]), poses(work)
+            here, now = corners(work.posture.shapes[: len(scene.shapes.links)]), poses(work)
             for base in range(7):
                 # The points as seen from the base link, moved back to where that was in the middle.
                 R = frames[0][base] @ now[0][base].T
                 seen = (here - now[1][base]) @ R.T + frames[1][base]
                 away = np.linalg.norm(seen - middle, axis=2).max(axis=1)
                 moved[:, base] = np.maximum(moved[:, base], away)
-        before = np.arange(8) < scene.link_frame[:, None]
+        before = np.arange(8) < scene.shapes.link_frame[:, None]
         # Rounding errors of positions are below 1e-12.
         assert np.all(moved[before] <= bound[before] + 1e-12)
-        closer.append(bound[:, 0] < bound[scene.root, 0])
+        closer.append(bound[:, 0] < bound[scene.shapes.root, 0])
     # Most shapes move less than the box around those of their link.
     assert np.mean(closer) > 0.5
 
 
 def poses(work):
     """Return orientations and origins of the links in A."""
-    return work.link_R.copy(), work.link_p.copy()
+    return work.posture.link_R.copy(), work.posture.link_p.copy()

@@ -54,11 +54,11 @@ def every(chain):
 
 
 def joints_between(scene):
-    return scene.link_frame[scene.pair[:, 0]] - scene.pair[:, 2]
+    return scene.shapes.link_frame[scene.pairs.members[:, 0]] - scene.pairs.members[:, 2]
 
 
 def all_of(scene):
-    return np.ones(len(scene.pair), np.bool_)
+    return np.ones(len(scene.pairs.members), np.bool_)
 
 
 def test_pairs_that_up_to_three_joints_keep_apart_are_left_out(chain, every, rng):
@@ -92,16 +92,18 @@ def test_pairs_that_are_not_to_be_checked_are_kept(every):
 
 def test_a_table_that_clears_the_pair_at_one_angle_alone_does_not_leave_it_out(every):
     # As if the balls were of the robot: the last body of the scene.
-    kept = (joints_between(every) == MOST_BETWEEN) & (every.pair[:, 1] == len(every.body) - 1)
-    ball = every.body.max() + 1
+    kept = (joints_between(every) == MOST_BETWEEN) & (
+        every.pairs.members[:, 1] == len(every.shapes.body) - 1
+    )
+    ball = every.shapes.body.max() + 1
     scene = with_pairs(every, kept)
-    body = scene.body.copy()
+    body = scene.shapes.body.copy()
     body[-1] = ball
     corners = np.zeros((SIZE, SIZE), np.uint8)
     # Near the angle 0 of the last joint between, and at no other one.
     corners[:, [0, 1, -1]] = 255
     of_bodies = np.full((ball + 1, ball + 1), -1)
-    of_bodies[:, ball - scene.robot] = 0
+    of_bodies[:, ball - scene.shapes.robot] = 0
     tables = DistanceTables(
         of_bodies,
         np.array([[0, 2]]),
@@ -110,6 +112,6 @@ def test_a_table_that_clears_the_pair_at_one_angle_alone_does_not_leave_it_out(e
         np.zeros(1, np.int64),
         corners.ravel(),
     )
-    scene = scene._replace(body=body, distances=tables)
-    assert len(scene.pair) == 1
+    scene = scene._replace(shapes=scene.shapes._replace(body=body), distances=tables)
+    assert len(scene.pairs.members) == 1
     assert np.all(needed_pairs(scene, all_of(scene)))

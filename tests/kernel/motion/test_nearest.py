@@ -31,15 +31,19 @@ def planted(postures):
 def distances(scene, postures, target):
     """Return the distances of postures, joints without limits the short way round [rad]."""
     angle = postures - target
-    turns = np.divide(angle, scene.period, out=np.zeros_like(angle), where=scene.period > 0.0)
-    return np.sqrt((scene.weight * (angle - scene.period * np.round(turns)) ** 2).sum(axis=1))
+    turns = np.divide(
+        angle, scene.limits.period, out=np.zeros_like(angle), where=scene.limits.period > 0.0
+    )
+    return np.sqrt(
+        (scene.chain.weight * (angle - scene.limits.period * np.round(turns)) ** 2).sum(axis=1)
+    )
 
 
 @pytest.mark.parametrize("nodes", [1, CHUNK - 1, CHUNK, 3 * CHUNK + 5])
 def test_nearest_node_is_that_of_plain_loops(scene, rng, nodes):
     postures = rng.uniform(-4.0, 4.0, (nodes, 7))
     trees = planted(postures)
-    assert np.any(scene.period > 0.0)
+    assert np.any(scene.limits.period > 0.0)
     for target in rng.uniform(-4.0, 4.0, (20, 7)):
         assert nearest(scene, trees, 0, target) == distances(scene, postures, target).argmin()
 

@@ -57,7 +57,7 @@ def test_a_path_leads_around_a_wall_and_is_free(chain, seed, thickness):
     path, ready, work, _ = plan(walled(chain, thickness=thickness), seed)
     assert len(path) > 2
     np.testing.assert_allclose(path[[0, -1]], SWING, atol=1e-12)
-    low, high = ready.lower - 1e-12, ready.upper + 1e-12
+    low, high = ready.limits.lower - 1e-12, ready.limits.upper + 1e-12
     assert np.all((path >= low) & (path <= high))
     for a, b in itertools.pairwise(path):
         assert certified(ready, work, straight_curve(a, b)) == 1.0
@@ -84,7 +84,7 @@ def test_an_environment_far_away_changes_nothing(chain):
 def test_without_a_gap_there_is_no_path(chain):
     path, _, work, _ = plan(walled(chain, 0.0, 3.0, begin=0.3), iterations=200)
     assert path is None
-    assert work.hits.sum() > 0
+    assert work.contacts.hits.sum() > 0
 
 
 def test_shortcuts_take_full_turns_off(chain):

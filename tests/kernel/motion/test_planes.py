@@ -24,22 +24,22 @@ SAMPLES = 60
 def judge(owned_scene, owned_work, control, plane, meets):
     """Fill between which pairs a plane is on a whole curve, and which are near at samples of it."""
     scene, work = unowned(owned_scene), unowned(owned_work)
-    work.control[: len(control)] = control
-    work.pieces[0] = len(control) // 3
+    work.curve.control[: len(control)] = control
+    work.curve.pieces[0] = len(control) // 3
     take_middle(work, 0.0, 1.0)
     take_posture(scene, work)
     take_twists(scene, work, 0.5)
-    for k in range(len(scene.pair)):
-        i, j, base = scene.pair[k]
+    for k in range(len(scene.pairs.members)):
+        i, j, base = scene.pairs.members[k]
         place_shape(scene, work, i)
         if base > 0:
             place_shape(scene, work, j)
-        plane[k] = plane_between(scene, work, i, j, base, scene.gap[k], np.inf, True)
+        plane[k] = plane_between(scene, work, i, j, base, scene.pairs.gap[k], np.inf, True)
     for n in range(SAMPLES + 1):
         t = n / SAMPLES
         take_middle(work, t, t)
         take_posture(scene, work)
-        for k in range(len(scene.pair)):
+        for k in range(len(scene.pairs.members)):
             meets[k] |= is_near(scene, work, k, False)
 
 
@@ -53,7 +53,7 @@ def test_shapes_with_a_plane_between_them_do_not_meet(rng, pieces, bent, back):
     planes = tight = 0
     for seed in range(3):
         scene, work, _ = toy(chain, seed, obstacles=40)
-        plane, meets = np.zeros((2, len(scene.pair)), np.bool_)
+        plane, meets = np.zeros((2, len(scene.pairs.members)), np.bool_)
         for _ in range(40):
             start = within_limits(rng, chain)
             step = rng.normal(size=7) * (back or 0.3)
@@ -77,14 +77,14 @@ def test_shapes_with_a_plane_between_them_do_not_meet(rng, pieces, bent, back):
 def distances(owned_scene, owned_work, q, distance):
     """Fill the distance of each pair at a posture, at most 0.3 m; the gaps of the scene change."""
     scene, work = unowned(owned_scene), unowned(owned_work)
-    work.q[:], work.delta[:] = q, 0.0
+    work.posture.q[:], work.piece.delta[:] = q, 0.0
     take_posture(scene, work)
-    for k in range(len(scene.pair)):
+    for k in range(len(scene.pairs.members)):
         low, high = 0.0, 0.3
         for _ in range(40):
-            scene.gap[k] = 0.5 * (low + high)
+            scene.pairs.gap[k] = 0.5 * (low + high)
             near = is_near(scene, work, k, False)
-            low, high = (low, scene.gap[k]) if near else (scene.gap[k], high)
+            low, high = (low, scene.pairs.gap[k]) if near else (scene.pairs.gap[k], high)
         distance[k] = low
 
 
@@ -92,13 +92,13 @@ def distances(owned_scene, owned_work, q, distance):
 def keep(owned_scene, owned_work, control, gap, plane):
     """Fill between which pairs a plane keeps a gap on a whole curve."""
     scene, work = unowned(owned_scene), unowned(owned_work)
-    work.pieces[0] = 1
-    work.control[: len(control)] = control
+    work.curve.pieces[0] = 1
+    work.curve.control[: len(control)] = control
     take_middle(work, 0.0, 1.0)
     take_posture(scene, work)
     take_twists(scene, work, 0.5)
-    for k in range(len(scene.pair)):
-        i, j, base = scene.pair[k]
+    for k in range(len(scene.pairs.members)):
+        i, j, base = scene.pairs.members[k]
         place_shape(scene, work, i)
         if base > 0:
             place_shape(scene, work, j)
@@ -109,8 +109,8 @@ def test_motion_away_from_a_plane_does_not_count(rng):
     """Shapes that are nearest at one end of a short edge are certified down to nearly there."""
     chain = drake_arm("pr2 left").chain
     scene, work, _ = toy(chain, 0, obstacles=40)
-    begin, end = np.empty((2, len(scene.pair)))
-    plane = np.zeros(len(scene.pair), np.bool_)
+    begin, end = np.empty((2, len(scene.pairs.members)))
+    plane = np.zeros(len(scene.pairs.members), np.bool_)
     near = kept = 0
     for _ in range(150):
         start = within_limits(rng, chain)
@@ -133,12 +133,12 @@ def test_motion_away_from_a_plane_does_not_count(rng):
 def place(owned_scene, owned_work, control, t, half):
     """Place the shapes of the arm in the middle of a part of a curve."""
     scene, work = unowned(owned_scene), unowned(owned_work)
-    work.pieces[0] = 1
-    work.control[: len(control)] = control
+    work.curve.pieces[0] = 1
+    work.curve.control[: len(control)] = control
     take_middle(work, t - half, t + half)
     take_posture(scene, work)
     take_twists(scene, work, half)
-    for i in range(len(scene.links)):
+    for i in range(len(scene.shapes.links)):
         place_shape(scene, work, i)
 
 
@@ -158,17 +158,17 @@ def corners(shapes):
 def test_the_motion_of_a_shape_is_bounded_closely(rng):
     chain = drake_arm("pr2 left").chain
     scene, work, _ = toy(chain, 0)
-    count, slack = len(scene.links), []
+    count, slack = len(scene.shapes.links), []
     for _ in range(60):
         start = within_limits(rng, chain)
         control = start + np.linspace(0.0, 1.0, 4)[:, None] * rng.normal(size=7) * 0.1
         control[1:3] += rng.normal(size=(2, 7)) * 0.01
         place(scene, work, control, 0.5, 0.5)
-        bound, middle = work.motion[:, 0].copy(), corners(work.shapes[:count])
+        bound, middle = work.piece.motion[:, 0].copy(), corners(work.posture.shapes[:count])
         moved = np.zeros(count)
         for t in np.linspace(0.0, 1.0, 21):
             place(scene, work, control, t, 0.0)
-            away = np.linalg.norm(corners(work.shapes[:count]) - middle, axis=2).max(axis=1)
+            away = np.linalg.norm(corners(work.posture.shapes[:count]) - middle, axis=2).max(axis=1)
             moved = np.maximum(moved, away)
         assert np.all(moved <= bound)
         slack.append(bound / moved)

@@ -61,7 +61,9 @@ def test_the_tool_stays_on_the_line_between_the_points_too(chain, rng):
             R, p = link_poses(chain, spline(s))[-1]
             np.testing.assert_allclose(p, p0 + s * offset, atol=2 * OFF_LINE)
             np.testing.assert_allclose(R, R0, atol=2 * OFF_LINE)
-            assert np.all((spline(s) > ready.lower - 1e-9) & (spline(s) < ready.upper + 1e-9))
+            assert np.all(
+                (spline(s) > ready.limits.lower - 1e-9) & (spline(s) < ready.limits.upper + 1e-9)
+            )
     assert done > 5
 
 
@@ -97,10 +99,10 @@ def test_a_plate_blocks_the_line_and_is_named(chain):
     ready, work, _ = prepared(with_obstacle(scene, plate))
     assert posture_contact(ready, work, q) == NO_PAIR
     assert follow(ready, work, q, ahead)[0] == BLOCKED
-    arm, other, carrier = ready.pair[work.contact[0]]
-    assert ready.link_frame[arm] == 7
+    arm, other, carrier = ready.pairs.members[work.contacts.pair[0]]
+    assert ready.shapes.link_frame[arm] == 7
     assert carrier == 0
-    assert ready.fixed[other - len(ready.links), SIZE] == 0.0005
+    assert ready.shapes.fixed[other - len(ready.shapes.links), SIZE] == 0.0005
 
 
 def test_joint_limits_and_velocity_limits_end_a_line(chain):

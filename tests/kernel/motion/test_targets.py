@@ -25,14 +25,18 @@ def draw(scene, trees, beyond, drawn):
 
 def test_postures_beyond_the_limits_are_set_to_them():
     scene, trees = prepared(walled(drake_arm("pr2 left").chain))[0], new_trees(0)
-    bounded = scene.period == 0.0
+    bounded = scene.limits.period == 0.0
     trees.nodes[0], trees.q[0, 0] = 1, 0.0
-    trees.q[0, 0, bounded] = (scene.lower[bounded] + scene.upper[bounded]) / 2.0
+    trees.q[0, 0, bounded] = (scene.limits.lower[bounded] + scene.limits.upper[bounded]) / 2.0
     at_limit = []
     for beyond in (0.0, BEYOND):
         drawn = np.empty((DRAWS, 7))
         draw(scene, trees, beyond, drawn)
-        drawn, lower, upper = drawn[:, bounded], scene.lower[bounded], scene.upper[bounded]
+        drawn, lower, upper = (
+            drawn[:, bounded],
+            scene.limits.lower[bounded],
+            scene.limits.upper[bounded],
+        )
         assert np.all((drawn >= lower) & (drawn <= upper))
         at_limit.append(np.mean((drawn == lower) | (drawn == upper)))
     # Of those not drawn around a node, the part of the wider range that is beyond the limits.

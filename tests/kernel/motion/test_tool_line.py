@@ -41,7 +41,7 @@ def place(owned_scene, owned_work, offset, points, tangents, errors, begin, end)
     take_middle(work, begin, end)
     take_posture(scene, work)
     take_twists(scene, work, 0.5 * (end - begin))
-    for i in range(len(scene.links)):
+    for i in range(len(scene.shapes.links)):
         place_shape(scene, work, i)
 
 
@@ -60,13 +60,13 @@ def errors_at_middles(chain, spline, offset, pieces):
 def test_shapes_stay_where_line_and_tool_lead_them(rng, pieces):
     chain = drake_arm("pr2 left").chain
     scene, work, _ = prepared(bare(chain))
-    count, wider, beyond, lines = len(scene.links), [], 0, 0
+    count, wider, beyond, lines = len(scene.shapes.links), [], 0, 0
     for _ in range(400):
         q, offset = within_limits(rng, chain), rng.normal(size=3)
         offset *= LENGTH / np.linalg.norm(offset)
         points, tangents = np.empty((2, pieces + 1, 7))
         line = new_straight_workspace()
-        work.line[3] = np.inf
+        work.piece.line[3] = np.inf
         if straight_motion(scene, work, line, q, offset, FASTEST, points, tangents) == LIMITS:
             continue
         spline = CubicHermiteSpline(np.linspace(0.0, 1.0, pieces + 1), points, tangents)
@@ -76,28 +76,28 @@ def test_shapes_stay_where_line_and_tool_lead_them(rng, pieces):
         lines += 1
         take = (scene, work, offset, points, tangents, errors)
         place(*take, 0.0, 1.0)
-        seen = work.by_tool[:count].copy()
-        assert not seen[scene.link_frame < SEEN_FROM_TOOL].any()
-        frame = scene.link_frame[seen]
-        rest, motion = work.rest[:count, 0][seen], work.motion[:count, 0][seen]
+        seen = work.piece.by_tool[:count].copy()
+        assert not seen[scene.shapes.link_frame < SEEN_FROM_TOOL].any()
+        frame = scene.shapes.link_frame[seen]
+        rest, motion = work.piece.rest[:count, 0][seen], work.piece.motion[:count, 0][seen]
         middle, w, v = (
-            corners(work.shapes[:count])[seen],
-            work.turn[frame, :3],
-            work.turn[frame, 3:],
+            corners(work.posture.shapes[:count])[seen],
+            work.piece.tool_twist[frame, :3],
+            work.piece.tool_twist[frame, 3:],
         )
         to_first_order = np.cross(w[:, None], middle) + v[:, None]
         for t in np.linspace(-1.0, 1.0, 21):
             at = 0.5 * (1.0 + t)
             place(*take, at, at)
-            moved = corners(work.shapes[:count])[seen] - middle
+            moved = corners(work.posture.shapes[:count])[seen] - middle
             away = np.linalg.norm(moved - t * to_first_order, axis=2).max(axis=1, initial=0.0)
             assert np.all(away <= rest)
             assert np.all(np.linalg.norm(moved, axis=2).max(axis=1, initial=0.0) <= motion)
             # The gripper leaves the line by no more than the errors, which are not nothing.
             beyond += np.count_nonzero(away[frame == 7] > 1e-5)
-        work.line[3] = np.inf
+        work.piece.line[3] = np.inf
         place_without_line(scene, work)
-        wider.append(work.rest[:count, 0][seen] / rest)
+        wider.append(work.piece.rest[:count, 0][seen] / rest)
     assert lines > 20
     assert beyond > 20
     # By the joints between the shapes and the base, the bound is several times as wide.
@@ -111,5 +111,5 @@ def place_without_line(owned_scene, owned_work):
     take_middle(work, 0.0, 1.0)
     take_posture(scene, work)
     take_twists(scene, work, 0.5)
-    for i in range(len(scene.links)):
+    for i in range(len(scene.shapes.links)):
         place_shape(scene, work, i)
