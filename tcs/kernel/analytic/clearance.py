@@ -47,18 +47,20 @@ ZERO, ONE, THREE, NOWHERE = int_constant(0), int_constant(1), int_constant(3), i
 @inner
 def by_angle(search: Search, found: int) -> None:
     """Sort the candidates by branch, then by angle."""
+    candidates = search.candidates
     for n in range(found):
         # The offset exceeds any angle of the free joint [rad].
-        search.key[n] = search.found_angle[n] + 1e4 * search.found_branch[n]
+        candidates.key[n] = candidates.angle[n] + 1e4 * candidates.branch[n]
     sort_candidates(search, found)
 
 
 @inner
 def are_neighbours(search: Search, m: int, n: int) -> bool:
     """Return whether no infeasible sample lies between two consecutive candidates."""
-    width = search.found_angle[n] - search.found_angle[m]
-    spacing = max(search.found_step[m], search.found_step[n])
-    return search.found_branch[m] == search.found_branch[n] and width < SAME_STRETCH * spacing
+    candidates = search.candidates
+    width = candidates.angle[n] - candidates.angle[m]
+    spacing = max(candidates.step[m], candidates.step[n])
+    return candidates.branch[m] == candidates.branch[n] and width < SAME_STRETCH * spacing
 
 
 @inner
@@ -69,7 +71,7 @@ def add_ends(problem: Problem, search: Search, found: int) -> int:
         Updated number of candidates.
     """
     by_angle(search, found)
-    order, before = search.order, found
+    order, before = search.candidates.order, found
     for rank in range(before):
         n = order[rank]
         for side in (-1, 1):
@@ -96,8 +98,9 @@ def _add_end(problem: Problem, search: Search, n: int, side: int, found: int) ->
     Returns:
         Updated number of candidates.
     """
-    b, angle = search.found_branch[n], search.found_angle[n]
-    inside, outside = 0.0, search.found_step[n]
+    candidates = search.candidates
+    b, angle = candidates.branch[n], candidates.angle[n]
+    inside, outside = 0.0, candidates.step[n]
     for _ in range(END_HALVINGS):
         middle = 0.5 * (inside + outside)
         if is_feasible(problem, search, b, angle + side * middle):
@@ -114,9 +117,10 @@ def _add_end(problem: Problem, search: Search, n: int, side: int, found: int) ->
 @inner
 def is_feasible(problem: Problem, search: Search, b: int, angle: float) -> bool:
     """Return whether all joints keep their limits at an angle on branch b, the first sample."""
-    search.angle[0], search.cosine[0], search.sine[0] = angle, np.cos(angle), np.sin(angle)
+    samples = search.samples
+    samples.angle[0], samples.cosine[0], samples.sine[0] = angle, np.cos(angle), np.sin(angle)
     solve(problem.arm, search, b, ONE)
-    return search.slack[0] >= 0.0
+    return samples.slack[0] >= 0.0
 
 
 @inner
@@ -133,37 +137,41 @@ def free_between(
         found: Number of candidates.
 
     Returns:
-        Updated number of candidates; those appended at the end, from `search.free_from` on,
-        are free.
+        Updated number of candidates; those appended at the end, from `candidates.free_from` on, are
+        free.
     """
+    candidates, bisection = search.candidates, search.bisection
     found = add_ends(problem, search, found)
-    search.free_from[0] = found
+    candidates.free_from[0] = found
     by_angle(search, found)
     count, halvings, placed = found, 0, NOWHERE
     for rank in range(count):
-        n = search.order[rank]
-        if search.found_pair[n, 0] == UNCHECKED_PAIR and _is_free_at(
-            problem, work, body_A, search, search.found_branch[n], search.found_angle[n]
+        n = candidates.order[rank]
+        if candidates.pair[n, 0] == UNCHECKED_PAIR and _is_free_at(
+            problem, work, body_A, search, candidates.branch[n], candidates.angle[n]
         ):
-            search.angle[0], search.measure[0] = search.found_angle[n], search.found_measure[n]
-            found = add_candidate(search, search.found_branch[n], ZERO, search.found_step[n], found)
-            search.found_pair[n, 0] = NO_PAIR
-        elif search.found_pair[n, 0] == UNCHECKED_PAIR:
-            _keep(search.q, work.last, search.found_q[n], search.found_pair[n])
-        if rank == 0 or not are_neighbours(search, search.order[rank - 1], n):
+            search.samples.angle[0], search.samples.measure[0] = (
+                candidates.angle[n],
+                candidates.measure[n],
+            )
+            found = add_candidate(search, candidates.branch[n], ZERO, candidates.step[n], found)
+            candidates.pair[n, 0] = NO_PAIR
+        elif candidates.pair[n, 0] == UNCHECKED_PAIR:
+            _keep(search.q, work.last, candidates.q[n], candidates.pair[n])
+        if rank == 0 or not are_neighbours(search, candidates.order[rank - 1], n):
             continue
-        m, b = search.order[rank - 1], search.found_branch[n]
-        ends, end_q, end_pair = search.ends_angle, search.ends_q, search.ends_pair
-        ends[0, 0], ends[0, 1] = search.found_angle[m], search.found_angle[n]
-        _keep(search.found_q[m], search.found_pair[m], end_q[0, 0], end_pair[0, 0])
-        _keep(search.found_q[n], search.found_pair[n], end_q[0, 1], end_pair[0, 1])
-        R, p = search.ends_R, search.ends_p
+        m, b = candidates.order[rank - 1], candidates.branch[n]
+        ends, end_q, end_pair = bisection.angle, bisection.q, bisection.pair
+        ends[0, 0], ends[0, 1] = candidates.angle[m], candidates.angle[n]
+        _keep(candidates.q[m], candidates.pair[m], end_q[0, 0], end_pair[0, 0])
+        _keep(candidates.q[n], candidates.pair[n], end_q[0, 1], end_pair[0, 1])
+        R, p = bisection.R, bisection.p
         # The left end is the right end of the last interval.
         if placed == m:
             _copy_poses(R[0, 1], p[0, 1], R[0, 0], p[0, 0])
         else:
-            link_poses(problem.chain.R, problem.chain.p, search.found_q[m], R[0, 0], p[0, 0])
-        link_poses(problem.chain.R, problem.chain.p, search.found_q[n], R[0, 1], p[0, 1])
+            link_poses(problem.chain.R, problem.chain.p, candidates.q[m], R[0, 0], p[0, 0])
+        link_poses(problem.chain.R, problem.chain.p, candidates.q[n], R[0, 1], p[0, 1])
         placed, top = n, 1
         while top and halvings < MAX_HALVINGS:
             top -= 1
@@ -241,7 +249,8 @@ def _stays_in_contact(
 
     True also if they move too little for a free angle between the ends to matter.
     """
-    pair, R, p = search.ends_pair[top], search.ends_R[top], search.ends_p[top]
+    bisection = search.bisection
+    pair, R, p = bisection.pair[top], bisection.R[top], bisection.p[top]
     if pair[0, 0] == NO_PAIR or pair[1, 0] == NO_PAIR:
         return pair[0, 0] == pair[1, 0]
     motion = other = _motion(problem, search, R, p, pair[0])
@@ -267,7 +276,7 @@ def _table_may_clear(problem: Problem, search: Search, top: int, pair: IntArray)
         other, gap = problem.links.body[j], problem.clearances.arm[i, j]
     else:
         other, gap = problem.body.body[j], problem.clearances.body[i, j]
-    distances, ends = problem.distances, search.ends_q[top]
+    distances, ends = problem.distances, search.bisection.q[top]
     n = distances.of_bodies[problem.links.body[i], other]
     return n >= 0 and may_come_apart(distances, n, ends[0], ends[1], PATH, gap)
 
@@ -282,7 +291,7 @@ def _motion(
         if side == 2 and pair[0] != ARM:
             break
         i = pair[side]
-        frame, rows = problem.links.frame[i], search.moved
+        frame, rows = problem.links.frame[i], search.bisection.moved
         move(R[0, frame], p[0, frame], problem.links.shapes, i, rows, ZERO)
         move(R[1, frame], p[1, frame], problem.links.shapes, i, rows, ONE)
         total += np.sqrt(_square(rows, CENTRE, ONE))

@@ -146,14 +146,15 @@ def motions(
 @inner
 def record_intervals(arm: ArmSolver, search: Search, b: int, count: int, step: float) -> None:
     """Append the intervals between the samples on branch b that need to be divided."""
-    motions(arm, search.goal, search.rows, search.slack, count, step, search.motion)
+    samples = search.samples
+    motions(arm, search.goal, samples.rows, samples.slack, count, step, samples.motion)
     for i in range(count - 1):
-        if search.motion[i] > FAR_ENDS:
-            measure_samples(arm, search.rows, search.slack, count, search.measure)
+        if samples.motion[i] > FAR_ENDS:
+            measure_samples(arm, samples.rows, samples.slack, count, samples.measure)
             break
     for i in range(count - 1):
-        if search.motion[i] > 0.0:
-            _record(search, b, i, _most(search, i) if search.motion[i] > FAR_ENDS else -1.0)
+        if samples.motion[i] > 0.0:
+            _record(search, b, i, _most(search, i) if samples.motion[i] > FAR_ENDS else -1.0)
 
 
 @inner
@@ -162,7 +163,7 @@ def record_fast(arm: ArmSolver, search: Search, b: int, count: int, step: float)
 
     Next to singular postures joints 2, 3 and 5 move that far, and others only with them.
     """
-    rows, fast = search.rows, 0
+    rows, fast = search.samples.rows, 0
     for i in range(count - 1):
         n = np.uint64(i)
         m = n + ONE
@@ -180,38 +181,46 @@ def record_uncovered(
     arm: ArmSolver, search: Search, b: int, count: int, step: float, windows: int
 ) -> None:
     """Append the intervals on branch b that need to be divided and lie in no window."""
-    motions(arm, search.goal, search.rows, search.slack, count, step, search.motion)
+    samples = search.samples
+    motions(arm, search.goal, samples.rows, samples.slack, count, step, samples.motion)
     w = 0
     for i in range(count - 1):
-        while w < windows and search.windows[w, 1] <= i:
+        while w < windows and search.feasible.windows[w, 1] <= i:
             w += 1
-        if search.motion[i] > 0.0 and not (w < windows and search.windows[w, 0] <= i):
+        if samples.motion[i] > 0.0 and not (w < windows and search.feasible.windows[w, 0] <= i):
             _record(search, b, i, -1.0)
 
 
 @inner
 def _record(search: Search, b: int, i: int, most: float) -> None:
     """Append the interval between samples i and i + 1, which holds at most a given isotropy."""
-    n = search.interval_count[0]
+    postponed = search.postponed
+    n = postponed.number[0]
     if n < MAX_INTERVALS:
-        interval = search.intervals[n]
-        interval[0], interval[1], interval[2] = search.angle[i], search.angle[i + 1], b
+        interval = postponed.intervals[n]
+        interval[0], interval[1], interval[2] = (
+            search.samples.angle[i],
+            search.samples.angle[i + 1],
+            b,
+        )
         interval[3] = most
-        search.interval_count[0] = n + 1
+        postponed.number[0] = n + 1
 
 
 @inner
 def _most(search: Search, i: int) -> float:
     """Return the greatest isotropy that may lie between samples i and i + 1."""
-    ends = abs(search.measure[i]) ** (1.0 / 6.0) + abs(search.measure[i + 1]) ** (1.0 / 6.0)
-    return 0.5 * (ends + SLOPE * search.motion[i])
+    samples = search.samples
+    ends = abs(samples.measure[i]) ** (1.0 / 6.0) + abs(samples.measure[i + 1]) ** (1.0 / 6.0)
+    return 0.5 * (ends + SLOPE * samples.motion[i])
 
 
 @inner
 def _may_improve(search: Search, i: int, isotropy: float) -> bool:
     """Return whether more than an isotropy may lie between samples i and i + 1."""
-    least = min(search.slack[i], search.slack[i + 1])
-    if search.motion[i] <= (FAR if least >= 0.0 else FAR_ENDS):
+    samples = search.samples
+    least = min(samples.slack[i], samples.slack[i + 1])
+    if samples.motion[i] <= (FAR if least >= 0.0 else FAR_ENDS):
         return False
     return _most(search, i) > isotropy
 
@@ -230,9 +239,10 @@ def divide_intervals(arm: ArmSolver, search: Search, found: int, isotropy: float
     Returns:
         Updated number of candidates.
     """
-    stack, intervals, divisions = search.stack, search.interval_count[0], 0
+    postponed, samples = search.postponed, search.samples
+    stack, intervals, divisions = postponed.stack, postponed.number[0], 0
     for k in range(intervals):
-        interval = search.intervals[k]
+        interval = postponed.intervals[k]
         if isotropy >= 0.0 and interval[3] <= isotropy:
             continue
         b = int(interval[2])
@@ -245,17 +255,17 @@ def divide_intervals(arm: ArmSolver, search: Search, found: int, isotropy: float
             step = fill_samples(search, stack[top, 0], stack[top, 1], PARTS)
             solve(arm, search, b, PARTS)
             if isotropy >= 0.0:
-                measure_samples(arm, search.rows, search.slack, PARTS, search.measure)
+                measure_samples(arm, samples.rows, samples.slack, PARTS, samples.measure)
             else:
                 measure_feasible(arm, search, PARTS)
-            motions(arm, search.goal, search.rows, search.slack, PARTS, step, search.motion)
+            motions(arm, search.goal, samples.rows, samples.slack, PARTS, step, samples.motion)
             for i in range(PARTS):
-                if 0 < i < PARTS - 1 and search.slack[i] >= 0.0:
+                if 0 < i < PARTS - 1 and samples.slack[i] >= 0.0:
                     found = add_candidate(search, b, i, step, found)
                 divisible = i < PARTS - 1 and step > FINEST and top < MAX_STACK
-                if not divisible or search.motion[i] <= NEAR:
+                if not divisible or samples.motion[i] <= NEAR:
                     continue
                 if isotropy < 0.0 or _may_improve(search, i, isotropy):
-                    stack[top, 0], stack[top, 1] = search.angle[i], search.angle[i + 1]
+                    stack[top, 0], stack[top, 1] = samples.angle[i], samples.angle[i + 1]
                     top += 1
     return found

@@ -93,26 +93,27 @@ def best_free(
         Index of the best collision-free candidate or -1; contact code of the candidate with the
         highest measure, or NO_CONTACT if it touches nothing.
     """
+    candidates = search.candidates
     first_contact = NO_CONTACT
-    top = start + best_of(search.found_measure[start:found], found - start)
+    top = start + best_of(candidates.measure[start:found], found - start)
     for rank in range(found - start):
         if rank == 1:
             for n in range(found):
-                search.key[n] = -search.found_measure[n] if n >= start else np.inf
+                candidates.key[n] = -candidates.measure[n] if n >= start else np.inf
             sort_candidates(search, found)
         if rank:
-            top = search.order[rank]
-        if search.found_measure[top] <= least:
+            top = candidates.order[rank]
+        if candidates.measure[top] <= least:
             break
-        branch = problem.arm.branches[search.found_branch[top]]
-        sample_joints(problem.arm, search.goal, branch, search.found_angle[top], search.q)
+        branch = problem.arm.branches[candidates.branch[top]]
+        sample_joints(problem.arm, search.goal, branch, candidates.angle[top], search.q)
         contact = arm_contact(problem, work, body_A, search.q)
         if contact == NO_CONTACT and at_goal(problem, work):
             return top, first_contact
         for k in range(7):
-            search.found_q[top, k] = search.q[k]
+            candidates.q[top, k] = search.q[k]
         for k in range(3):
-            search.found_pair[top, k] = work.last[k] if contact != NO_CONTACT else NO_PAIR
+            candidates.pair[top, k] = work.last[k] if contact != NO_CONTACT else NO_PAIR
         if rank == 0:
             first_contact = contact
     return -1, first_contact
@@ -145,32 +146,33 @@ def refine(
     Returns:
         The measure at `best`, or `least`.
     """
+    candidates, samples = search.candidates, search.samples
     arm = problem.arm
-    b = search.found_branch[winner]
-    centre, step = search.found_angle[winner], search.found_step[winner]
-    value = search.found_measure[winner]
+    b = candidates.branch[winner]
+    centre, step = candidates.angle[winner], candidates.step[winner]
+    value = candidates.measure[winner]
     sample_joints(arm, search.goal, arm.branches[b], centre, search.trial)
     for _ in range(rounds):
         fine = fill_samples(search, centre - step, centre + step, REFINE_SAMPLES)
         solve(arm, search, b, REFINE_SAMPLES)
         measure_feasible(arm, search, REFINE_SAMPLES)
         for i in range(REFINE_SAMPLES):
-            if search.slack[i] < 0.0:
-                search.measure[i] = -1.0
+            if samples.slack[i] < 0.0:
+                samples.measure[i] = -1.0
             elif not samples_hold_measure(problem):
-                search.measure[i] = measure_of(problem, search, b, search.angle[i])
+                samples.measure[i] = measure_of(problem, search, b, samples.angle[i])
         for _ in range(REFINE_SAMPLES):
-            i = best_of(search.measure, REFINE_SAMPLES)
-            if search.measure[i] <= value:
+            i = best_of(samples.measure, REFINE_SAMPLES)
+            if samples.measure[i] <= value:
                 break
-            sample_joints(arm, search.goal, arm.branches[b], search.angle[i], search.q)
+            sample_joints(arm, search.goal, arm.branches[b], samples.angle[i], search.q)
             contact = arm_contact(problem, work, body_A, search.q)
             if contact == NO_CONTACT and at_goal(problem, work):
-                centre, value = search.angle[i], search.measure[i]
+                centre, value = samples.angle[i], samples.measure[i]
                 for k in range(7):
                     search.trial[k] = search.q[k]
                 break
-            search.measure[i] = -1.0
+            samples.measure[i] = -1.0
         step = fine
     if value <= least:
         return least
@@ -186,10 +188,10 @@ def out_of_reach(problem: Problem, work: Workspace, search: Search) -> int:
     Args:
         problem: The scene.
         work: Workspace with the goal in A.
-        search: `goal`, `arcs` and `arc_count` are filled.
+        search: `goal` and the arcs of `feasible` are filled.
     """
     wrist_goal(problem.arm, work.R_AG, work.p_AG, search.goal)
-    search.arc_count[0], reach = elbow_arcs(problem.arm, search.goal, search.arcs)
+    search.feasible.arc_count[0], reach = elbow_arcs(problem.arm, search.goal, search.feasible.arcs)
     if reach == IN_REACH:
         return REACHED
     return TOO_FAR if reach == OUT_OF_REACH else JOINT_LIMITS
@@ -211,7 +213,7 @@ def score_pair(
     Returns:
         Reason and contact code.
     """
-    found = find_candidates(problem.arm, search, search.arc_count[0])
+    found = find_candidates(problem.arm, search, search.feasible.arc_count[0])
     _measure_candidates(problem, search, NONE, found)
     winner, contact, value = NOTHING, NO_CONTACT, -1.0
     if found:
@@ -226,7 +228,7 @@ def score_pair(
     if winner >= 0:
         exceeded = value ** (1.0 / 6.0) if samples_hold_measure(problem) else 0.0
     elif found:
-        record_all(problem.arm, search, search.arc_count[0])
+        record_all(problem.arm, search, search.feasible.arc_count[0])
     total = divide_intervals(problem.arm, search, found, exceeded)
     if total > found:
         _measure_candidates(problem, search, found, total)
@@ -244,7 +246,7 @@ def score_pair(
     if total == 0:
         return JOINT_LIMITS, NO_CONTACT
     last = free_between(problem, work, body_A, search, total)
-    first = search.free_from[0]
+    first = search.candidates.free_from[0]
     if first == last:
         return ARM_BLOCKED, contact
     _measure_candidates(problem, search, first, last)
@@ -273,15 +275,15 @@ def quick_look(
     Returns:
         Reason and contact code.
     """
-    found = find_candidates(problem.arm, search, search.arc_count[0])
+    found = find_candidates(problem.arm, search, search.feasible.arc_count[0])
     if not found:
         return JOINT_LIMITS, NO_CONTACT
     if least >= 0.0:
         return _best_above(problem, work, body_A, search, found, least)
     contact = NO_CONTACT
     for n in range(0, found, 1 + found // QUICK_TRIES):
-        branch = problem.arm.branches[search.found_branch[n]]
-        sample_joints(problem.arm, search.goal, branch, search.found_angle[n], search.q)
+        branch = problem.arm.branches[search.candidates.branch[n]]
+        sample_joints(problem.arm, search.goal, branch, search.candidates.angle[n], search.q)
         code = arm_contact(problem, work, body_A, search.q)
         if code == NO_CONTACT and at_goal(problem, work):
             return score_pair(problem, work, body_A, search)
@@ -315,7 +317,7 @@ def look_near(
         solve(arm, search, b, REFINE_SAMPLES)
         measure_feasible(arm, search, REFINE_SAMPLES)
         for i in range(REFINE_SAMPLES):
-            if search.slack[i] >= 0.0:
+            if search.samples.slack[i] >= 0.0:
                 found = add_candidate(search, b, i, step, found)
     if not found:
         return JOINT_LIMITS, NO_CONTACT
@@ -344,8 +346,9 @@ def _best_above(
 @inner
 def _measure_candidates(problem: Problem, search: Search, start: int, found: int) -> None:
     """Give candidates the measure that counts, if it is not the isotropy that samples hold."""
+    candidates = search.candidates
     if samples_hold_measure(problem):
         return
     for n in range(start, found):
-        b, angle = search.found_branch[n], search.found_angle[n]
-        search.found_measure[n] = measure_of(problem, search, b, angle)
+        b, angle = candidates.branch[n], candidates.angle[n]
+        candidates.measure[n] = measure_of(problem, search, b, angle)

@@ -39,24 +39,25 @@ def find_candidates(arm: ArmSolver, search: Search, arcs: int) -> int:
 
     Args:
         arm: The arm.
-        search: `goal` and `arcs` are read; the candidates are filled.
+        search: `goal` and `feasible.arcs` are read; the candidates are filled.
         arcs: Number of arcs.
 
     Returns:
         Number of candidates.
     """
-    search.interval_count[0] = 0
+    feasible = search.feasible
+    search.postponed.number[0] = 0
     length = _length(search, arcs)
     found = NONE
     for k in range(arcs):
         for b in range(len(arm.branches)):
             count, step = _sample_arc(arm, search, b, k, length)
-            windows = windows_of(search.slack, count, step, search.windows, 0)
+            windows = windows_of(search.samples.slack, count, step, feasible.windows, 0)
             if found == 0:
                 record_uncovered(arm, search, b, count, step, windows)
             for w in range(windows):
-                start = search.arcs[k, 0] + search.windows[w, 0] * step
-                stop = search.arcs[k, 0] + search.windows[w, 1] * step
+                start = feasible.arcs[k, 0] + feasible.windows[w, 0] * step
+                stop = feasible.arcs[k, 0] + feasible.windows[w, 1] * step
                 found = _refine_window(arm, search, b, start, stop, found)
     return found
 
@@ -70,19 +71,20 @@ def record_all(arm: ArmSolver, search: Search, arcs: int) -> None:
 
     Args:
         arm: The arm.
-        search: `goal` and `arcs` are read; the intervals are filled anew.
+        search: `goal` and `feasible.arcs` are read; the intervals are filled anew.
         arcs: Number of arcs.
     """
-    search.interval_count[0] = 0
+    feasible = search.feasible
+    search.postponed.number[0] = 0
     length = _length(search, arcs)
     for k in range(arcs):
         for b in range(len(arm.branches)):
             count, step = _sample_arc(arm, search, b, k, length)
-            windows = windows_of(search.slack, count, step, search.windows, 0)
+            windows = windows_of(search.samples.slack, count, step, feasible.windows, 0)
             record_uncovered(arm, search, b, count, step, windows)
             for w in range(windows):
-                start = search.arcs[k, 0] + search.windows[w, 0] * step
-                stop = search.arcs[k, 0] + search.windows[w, 1] * step
+                start = feasible.arcs[k, 0] + feasible.windows[w, 0] * step
+                stop = feasible.arcs[k, 0] + feasible.windows[w, 1] * step
                 fine, spacing = _sample_window(arm, search, b, start, stop)
                 record_intervals(arm, search, b, fine, spacing)
 
@@ -92,14 +94,14 @@ def _length(search: Search, arcs: int) -> float:
     """Return the length of all arcs together [rad]."""
     length = 0.0
     for k in range(arcs):
-        length += search.arcs[k, 1] - search.arcs[k, 0]
+        length += search.feasible.arcs[k, 1] - search.feasible.arcs[k, 0]
     return length
 
 
 @inner
 def _sample_arc(arm: ArmSolver, search: Search, b: int, k: int, length: float) -> tuple[int, float]:
     """Solve the samples of the first pass over arc k; return their number and spacing [rad]."""
-    first, last = search.arcs[k, 0], search.arcs[k, 1]
+    first, last = search.feasible.arcs[k, 0], search.feasible.arcs[k, 1]
     share = FIRST_SAMPLES * (last - first) / length if length > 0.0 else 0.0
     # To nearest: truncation would let rounding decide the number of samples of symmetric arcs.
     count = max(MIN_SAMPLES, int(share + 0.5))
@@ -124,31 +126,32 @@ def _refine_window(
     arm: ArmSolver, search: Search, b: int, first: float, last: float, found: int
 ) -> int:
     """Append the feasible angles of one window on branch b; return the number of candidates."""
+    samples, feasible = search.samples, search.feasible
     count, step = _sample_window(arm, search, b, first, last)
     measure_feasible(arm, search, count)
     if found == 0:
         record_intervals(arm, search, b, count, step)
     else:
         record_fast(arm, search, b, count, step)
-    before = search.slack[0] >= 0.0
+    before = samples.slack[0] >= 0.0
     ends = peaks = 0
     for i in range(count):
-        inside = search.slack[i] >= 0.0
+        inside = samples.slack[i] >= 0.0
         if inside:
             found = add_candidate(search, b, i, step, found)
         if inside != before and ends < MAX_WINDOWS:
             # The samples just outside and just inside an end of a feasible interval.
-            search.ends[ends, 0] = search.angle[i - 1] if inside else search.angle[i]
-            search.ends[ends, 1] = search.angle[i] if inside else search.angle[i - 1]
+            feasible.ends[ends, 0] = samples.angle[i - 1] if inside else samples.angle[i]
+            feasible.ends[ends, 1] = samples.angle[i] if inside else samples.angle[i - 1]
             ends += 1
         before = inside
-        if peaks < MAX_WINDOWS and is_peak(search.slack, i, count, step):
-            search.peaks[peaks] = search.angle[i]
+        if peaks < MAX_WINDOWS and is_peak(samples.slack, i, count, step):
+            feasible.peaks[peaks] = samples.angle[i]
             peaks += 1
     for e in range(ends):
-        found = _refine_end(arm, search, b, search.ends[e, 0], search.ends[e, 1], found)
+        found = _refine_end(arm, search, b, feasible.ends[e, 0], feasible.ends[e, 1], found)
     for k in range(peaks):
-        found = _refine_peak(arm, search, b, search.peaks[k], step, (first, last), found)
+        found = _refine_peak(arm, search, b, feasible.peaks[k], step, (first, last), found)
     return found
 
 
@@ -176,6 +179,7 @@ def _refine_peak(
     Returns:
         Updated number of candidates.
     """
+    samples = search.samples
     for _ in range(PEAK_REFINEMENTS):
         low, high = max(middle - step, ends[0]), min(middle + step, ends[1])
         step = fill_samples(search, low, high, FINE_SAMPLES)
@@ -183,12 +187,12 @@ def _refine_peak(
         measure_feasible(arm, search, FINE_SAMPLES)
         before = found
         for i in range(FINE_SAMPLES):
-            if search.slack[i] >= 0.0:
+            if samples.slack[i] >= 0.0:
                 found = add_candidate(search, b, i, step, found)
-        top = best_of(search.slack, FINE_SAMPLES)
-        if found > before or search.slack[top] < -PEAK_SLOPE * step:
+        top = best_of(samples.slack, FINE_SAMPLES)
+        if found > before or samples.slack[top] < -PEAK_SLOPE * step:
             break
-        middle = search.angle[top]
+        middle = samples.angle[top]
     return found
 
 
@@ -204,6 +208,6 @@ def _refine_end(
     solve(arm, search, b, FINE_SAMPLES - 1)
     measure_feasible(arm, search, FINE_SAMPLES - 1)
     for i in range(1, FINE_SAMPLES - 1):
-        if search.slack[i] >= 0.0:
+        if search.samples.slack[i] >= 0.0:
             found = add_candidate(search, b, i, abs(step), found)
     return found

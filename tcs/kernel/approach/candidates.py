@@ -28,9 +28,10 @@ AT_GOAL = int_constant(0)
 def follow_candidates(problem: Problem, approach: Approach, fastest: FloatArray) -> bool:
     """Fill `search.best` with the best approachable open node; return whether there is one."""
     columns, search = approach.columns, approach.search
+    candidates = search.candidates
     for rank in range(_list_candidates(problem, approach)):
-        n = search.order[rank]
-        b, i = search.found_branch[n], search.found_pair[n, 0]
+        n = candidates.order[rank]
+        b, i = candidates.branch[n], candidates.pair[n, 0]
         if rank > 0:
             if not _seems_free(problem, approach, b, i):
                 close_goal(approach, b, i)
@@ -76,6 +77,7 @@ def _list_candidates(problem: Problem, approach: Approach) -> int:
     been free, it would have found them.
     """
     grid, search, columns = approach.grid, approach.search, approach.columns
+    candidates = search.candidates
     _measure_nodes(problem, approach)
     best, best_branch = NOWHERE, NOWHERE
     while True:
@@ -85,16 +87,16 @@ def _list_candidates(problem: Problem, approach: Approach) -> int:
     count = 0
     for b in range(len(problem.arm.branches)):
         for i in range(columns[0]):
-            if grid.onward[b, 0, i] == NOWHERE or count == len(search.key):
+            if grid.onward[b, 0, i] == NOWHERE or count == len(candidates.key):
                 continue
-            search.found_branch[count], search.found_pair[count, 0] = b, i
-            search.key[count] = -grid.measure[b, i]
+            candidates.branch[count], candidates.pair[count, 0] = b, i
+            candidates.key[count] = -grid.measure[b, i]
             if grid.measure[b, i] > approach.known[0]:
-                search.key[count] += 2.0 * PHASE
+                candidates.key[count] += 2.0 * PHASE
             if b == best_branch and i == best:
-                search.key[count] -= PHASE
+                candidates.key[count] -= PHASE
             elif i % STRIDE:
-                search.key[count] += PHASE
+                candidates.key[count] += PHASE
             count += 1
     sort_candidates(search, count)
     return count

@@ -103,22 +103,24 @@ def end_of_window(
 def _is_open_at(problem: Problem, approach: Approach, b: int, level: int, angle: float) -> bool:
     """Return whether a level is open at an angle of the free joint within its limits [rad]."""
     search = approach.search
-    search.cosine[0], search.sine[0] = np.cos(angle), np.sin(angle)
+    samples = search.samples
+    samples.cosine[0], samples.sine[0] = np.cos(angle), np.sin(angle)
     _take_goal(search, approach.grid, level)
     solve(problem.arm, search, b, ONE)
-    return bool(search.slack[0] >= 0.0)
+    return bool(samples.slack[0] >= 0.0)
 
 
 @inner
 def _keep_straight(problem: Problem, approach: Approach, b: int, column: int) -> bool:
     """Return whether the line from a node can be completed without the free joint; fills it."""
     grid, search = approach.grid, approach.search
+    samples = search.samples
     angle = grid.origin[0] + column * grid.origin[1]
-    search.cosine[0], search.sine[0] = np.cos(angle), np.sin(angle)
+    samples.cosine[0], samples.sine[0] = np.cos(angle), np.sin(angle)
     for level in range(1, PIECES + 1):
         _take_goal(search, grid, level)
         solve(problem.arm, search, b, ONE)
-        if search.slack[0] < 0.0:
+        if samples.slack[0] < 0.0:
             return False
     for level in range(PIECES + 1):
         grid.onward[b, level, column] = column
@@ -177,7 +179,7 @@ def _open_level(
     Returns:
         Whether there are any.
     """
-    is_open, is_free, slack = grid.is_open[b, level], grid.is_free[b, level], search.slack
+    is_open, is_free, slack = grid.is_open[b, level], grid.is_free[b, level], search.samples.slack
     count = last - first + 1
     start = grid.origin[0] + first * grid.origin[1]
     fill_samples(search, start, start + max(count - 1, 1) * grid.origin[1], max(count, TWO))
@@ -198,7 +200,11 @@ def _open_level(
     if level == 0:
         # The rows of all samples begin at the same distance from those of the first.
         measure_samples(
-            arm, search.rows[low:], slack[low:], high + 1 - low, grid.measure[b, first + low :]
+            arm,
+            search.samples.rows[low:],
+            slack[low:],
+            high + 1 - low,
+            grid.measure[b, first + low :],
         )
     grid.deepest[b] = level
     grid.spans[b, level, 0], grid.spans[b, level, 1] = first + low, first + high

@@ -274,7 +274,7 @@ def _greatest_slack(arm: ArmSolver, approach: Approach, b: int, level: int) -> f
         for c in range(3):
             search.goal[r, c] = grid.goal[level, r, c]
     solve(arm, search, b, count)
-    return float(search.slack[best_of(search.slack, count)])
+    return float(search.samples.slack[best_of(search.samples.slack, count)])
 
 
 @inner
@@ -283,7 +283,7 @@ def _window(arm: ArmSolver, approach: Approach, b: int, level: int) -> tuple[int
     low = high = NOWHERE
     if _greatest_slack(arm, approach, b, level) >= 0.0:
         for i in range(approach.columns[0]):
-            if approach.search.slack[i] >= 0.0:
+            if approach.search.samples.slack[i] >= 0.0:
                 low, high = i if low == NOWHERE else low, i
     return low, high
 

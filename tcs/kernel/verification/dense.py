@@ -89,8 +89,11 @@ def _dense_scans(
         stop = start + max(count, 2) - 1
         fill_samples(search, first + start * step, first + stop * step, stop - start + 1)
         for i in range(count):
-            table[0, start + i] = search.angle[i]
-            table[1, start + i], table[2, start + i] = search.cosine[i], search.sine[i]
+            table[0, start + i] = search.samples.angle[i]
+            table[1, start + i], table[2, start + i] = (
+                search.samples.cosine[i],
+                search.samples.sine[i],
+            )
     angles = np.empty((samples + MOST_ADDED) * len(arm.branches))
     measures, branches = np.empty(angles.size), np.empty(angles.size, np.int64)
     for n in range(len(pairs)):
@@ -136,19 +139,22 @@ def _scan(
             environment_in_arm_base(problem, work, torso)
             environment_placed = True
         for b in range(len(arm.branches)):
-            search.angle[:count] = table[0, start : start + count]
-            search.cosine[:count] = table[1, start : start + count]
-            search.sine[:count] = table[2, start : start + count]
+            search.samples.angle[:count] = table[0, start : start + count]
+            search.samples.cosine[:count] = table[1, start : start + count]
+            search.samples.sine[:count] = table[2, start : start + count]
             solve(arm, search, b, count)
             measure_feasible(arm, search, count)
             pending = 0
             for i in range(count):
-                if search.slack[i] >= 0.0 and (i or not start):
-                    angles[found], branches[found] = search.angle[i], b
-                    measures[found] = search.measure[i]
+                if search.samples.slack[i] >= 0.0 and (i or not start):
+                    angles[found], branches[found] = search.samples.angle[i], b
+                    measures[found] = search.samples.measure[i]
                     found += 1
                 if i + 1 < count and _is_coarse(search, i, step):
-                    fast[pending, 0], fast[pending, 1] = search.angle[i], search.angle[i + 1]
+                    fast[pending, 0], fast[pending, 1] = (
+                        search.samples.angle[i],
+                        search.samples.angle[i + 1],
+                    )
                     pending += 1
             while pending and added[b] < MOST_ADDED:
                 pending -= 1
@@ -157,13 +163,16 @@ def _scan(
                 half = fill_samples(search, low, high, THREE)
                 solve(arm, search, b, THREE)
                 measure_feasible(arm, search, THREE)
-                if search.slack[1] >= 0.0:
-                    angles[found], branches[found] = search.angle[1], b
-                    measures[found] = search.measure[1]
+                if search.samples.slack[1] >= 0.0:
+                    angles[found], branches[found] = search.samples.angle[1], b
+                    measures[found] = search.samples.measure[1]
                     found += 1
                 for i in range(2):
                     if half > FINEST and pending < MAX_SAMPLES and _is_coarse(search, i, half):
-                        fast[pending, 0], fast[pending, 1] = search.angle[i], search.angle[i + 1]
+                        fast[pending, 0], fast[pending, 1] = (
+                            search.samples.angle[i],
+                            search.samples.angle[i + 1],
+                        )
                         pending += 1
     if not samples_hold_measure(problem):
         for i in range(found):
@@ -203,7 +212,8 @@ def _is_coarse(search: Search, i: int, step: float) -> bool:
 
     It does not where both samples are too far from feasible for the joints to get there and back.
     """
-    rows, motion = search.rows, 0.0
+    samples = search.samples
+    rows, motion = samples.rows, 0.0
     for k in range(6):
         c, s = int(C2) + 2 * k * ROW, int(C2) + (2 * k + 1) * ROW
         sine = rows[s + i + 1] * rows[c + i] - rows[c + i + 1] * rows[s + i]
@@ -217,7 +227,7 @@ def _is_coarse(search: Search, i: int, step: float) -> bool:
         return rows[aim] + rows[aim + 1] <= 2.0 * reach * (step + motion)
     if rows[wrist] > 0.0 and rows[wrist + 1] > 0.0:
         return rows[wrist] + rows[wrist + 1] <= 4.0 * (step + motion)
-    return max(search.slack[i], search.slack[i + 1]) > -2.0 * motion
+    return max(samples.slack[i], samples.slack[i + 1]) > -2.0 * motion
 
 
 def six_joint_scans(

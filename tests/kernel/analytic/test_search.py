@@ -24,13 +24,13 @@ def angles_of_both(chain, X_AG):
     """Return the feasible angles that kernel and reference find, in order."""
     arm, search = arm_solver(chain), new_search()
     wrist_goal(arm, X_AG[0], X_AG[1], search.goal)
-    count, _ = elbow_arcs(arm, search.goal, search.arcs)
+    count, _ = elbow_arcs(arm, search.goal, search.feasible.arcs)
     found = find_candidates(arm, search, count)
     arcs, _ = reference_candidates.elbow_arcs(chain, X_AG)
     expected = reference_candidates.find_candidates(chain, X_AG, arcs)
     free = free_joint(chain)
     assert count == len(arcs)
-    return np.sort(search.found_angle[:found]), np.sort(
+    return np.sort(search.candidates.angle[:found]), np.sort(
         [candidate.q[free] for candidate in expected]
     )
 
