@@ -24,9 +24,9 @@ from table import cell, header, parser, row, save
 from tcs.kernel.analytic.solver import ArmSolver
 from tcs.kernel.arrays import BoolArray, Chain, FloatArray, IntArray
 from tcs.kernel.motion.edges import posture_contact
-from tcs.kernel.motion.postures import postures_at
+from tcs.kernel.motion.goal_postures import postures_at
 from tcs.kernel.motion.scene import NO_PAIR, MotionScene, MotionWorkspace
-from tcs.kernel.motion.trees import new_trees
+from tcs.kernel.motion.search_trees import new_trees
 from tcs.kernel.verification.newton_solutions import newton_solutions, within
 from tcs.model.scene import NeighbourList
 from tcs.motion.recheck import CLEARANCE_ROUNDING

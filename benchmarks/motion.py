@@ -21,7 +21,7 @@ from table import cell, header, parser, row, save
 
 import tcs
 from tcs.kernel.arrays import FloatArray
-from tcs.kernel.motion.random import random_state
+from tcs.kernel.motion.search_trees import random_state
 from tcs.model.scene import NeighbourList
 from tcs.motion import Stop, accesses
 from tcs.motion.paths import find_path, rounded

@@ -26,11 +26,10 @@ from scipy.spatial.transform import Rotation
 from table import cell, header, parser, row, save
 
 from tcs.kernel.arrays import BOX, SceneArrays, Shapes
+from tcs.kernel.motion.box_trees import grouped
 from tcs.kernel.motion.connect import connect
 from tcs.kernel.motion.edges import NO_PAIR, posture_contact
-from tcs.kernel.motion.groups import grouped
-from tcs.kernel.motion.idle import needed_pairs
-from tcs.kernel.motion.random import random_state
+from tcs.kernel.motion.never_in_contact import needed_pairs
 from tcs.kernel.motion.scene import (
     MotionScene,
     MotionWorkspace,
@@ -38,7 +37,7 @@ from tcs.kernel.motion.scene import (
     new_motion_workspace,
     with_pairs,
 )
-from tcs.kernel.motion.trees import Trees, new_trees
+from tcs.kernel.motion.search_trees import Trees, new_trees, random_state
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import single_row
 from tcs.model.scene import LoweredScene

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.motion.postures import postures_at
+from tcs.kernel.motion.goal_postures import postures_at
 from tcs.kernel.motion.straight import (
     BLOCKED,
     LIMITS,

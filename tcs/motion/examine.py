@@ -23,8 +23,7 @@ from tcs.files.blocks import BlockFolder, opened_if
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import announced
 from tcs.kernel.motion.connect import connect
-from tcs.kernel.motion.random import random_state
-from tcs.kernel.motion.trees import Trees, new_trees
+from tcs.kernel.motion.search_trees import Trees, new_trees, random_state
 from tcs.motion.approach import Access, accesses, first_accesses
 from tcs.motion.kept_outcomes import KeptOutcomes, Outcomes, outcomes_key, table_of
 from tcs.motion.stops import BodyPair, Stop, StopGrid

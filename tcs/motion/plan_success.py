@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tcs.errors import TcsError
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.motion.edges import certified
-from tcs.kernel.motion.trees import new_trees
+from tcs.kernel.motion.search_trees import new_trees
 from tcs.model.scene import LoweredScene, lower
 from tcs.model.scene.lowering import environment_at
 from tcs.motion.motion_plan import MotionPlan, Segment, StopPlan

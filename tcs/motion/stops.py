@@ -12,9 +12,9 @@ import numpy as np
 from tcs.errors import TaskError
 from tcs.kernel.analytic.solver import is_outside
 from tcs.kernel.arrays import FloatArray, IntArray
+from tcs.kernel.motion.box_trees import grouped
 from tcs.kernel.motion.edges import posture_contact
-from tcs.kernel.motion.groups import grouped
-from tcs.kernel.motion.idle import needed_pairs
+from tcs.kernel.motion.never_in_contact import needed_pairs
 from tcs.kernel.motion.scene import (
     NO_PAIR,
     MotionScene,
@@ -26,7 +26,7 @@ from tcs.kernel.motion.scene import (
     torso_scene,
     with_pairs,
 )
-from tcs.kernel.motion.trees import Trees, new_trees
+from tcs.kernel.motion.search_trees import Trees, new_trees
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.rows import rows_at
 from tcs.model.grid import Axis, Grid, InitialConfiguration

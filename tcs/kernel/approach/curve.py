@@ -12,8 +12,8 @@ from tcs.kernel.approach.grid import PIECES, LineGrid
 from tcs.kernel.approach.turns import place_sample
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant
+from tcs.kernel.motion.contact_bounds import is_near, take_turned_posture
 from tcs.kernel.motion.edges import curve_is_free
-from tcs.kernel.motion.pairs import is_near, take_turned_posture
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
 from tcs.kernel.motion.straight import (
     OFF_LINE,

@@ -11,8 +11,8 @@ from tcs.kernel.approach.turns import place_sample
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner
 from tcs.kernel.contacts import NO_CONTACT
+from tcs.kernel.motion.contact_bounds import is_near, take_turned_posture
 from tcs.kernel.motion.edges import is_placed_free
-from tcs.kernel.motion.pairs import is_near, take_turned_posture
 from tcs.kernel.motion.scene import NO_PAIR, MotionScene
 from tcs.kernel.motion.straight import BLOCKED, DONE, LIMITS
 from tcs.kernel.problem import Problem

@@ -14,8 +14,8 @@ from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
 from tcs.kernel.cache import inner
 from tcs.kernel.collide import CENTRE, COLUMNS
 from tcs.kernel.contacts import BASE_FIXED
-from tcs.kernel.motion.groups import grouped
-from tcs.kernel.motion.idle import needed_pairs
+from tcs.kernel.motion.box_trees import grouped
+from tcs.kernel.motion.never_in_contact import needed_pairs
 from tcs.kernel.motion.scene import (
     MotionScene,
     MotionWorkspace,

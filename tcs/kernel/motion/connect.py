@@ -4,9 +4,9 @@ Edges of the trees are checked at postures only, and those of a path that they m
 where one is not, what has grown beyond it is removed, and the trees grow on (Bohlin, Kavraki 2000).
 Two trees grow, from the starts and from the goals. The smaller one takes a step towards a random
 posture; the other one is then extended to the new posture until it arrives or is blocked. The
-nearest node is the one from which the arm moves least, see `nearest`. A query that is not solved
-soon is a hard one, where paths lead through narrow passages: its trees take several steps, or half
-a one, and look for postures with joints at their limits.
+nearest node is the one from which the arm moves least, see `search_trees`. A query that is not
+solved soon is a hard one, where paths lead through narrow passages: its trees take several steps,
+or half a one, and look for postures with joints at their limits.
 """
 
 from __future__ import annotations
@@ -15,27 +15,29 @@ import numpy as np
 
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, jit
+from tcs.kernel.motion.contact_bounds import count_hit
 from tcs.kernel.motion.edges import (
     edge_is_certified,
     edge_is_free,
     edge_seems_free,
     posture_is_free,
 )
-from tcs.kernel.motion.nearest import count_blocked, nearest, place_node
-from tcs.kernel.motion.pairs import count_hit
-from tcs.kernel.motion.random import uniform
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
-from tcs.kernel.motion.shortcut import cut_corners, drop_postures
-from tcs.kernel.motion.trees import (
+from tcs.kernel.motion.search_trees import (
     MOST_NODES,
     MOST_POINTS,
     NONE,
     SAME,
     Trees,
+    count_blocked,
     difference,
     distance,
+    nearest,
+    place_node,
+    uniform,
     unwound,
 )
+from tcs.kernel.motion.shortcut import cut_corners, drop_postures
 from tcs.kernel.views import unowned
 
 STEP = 0.5

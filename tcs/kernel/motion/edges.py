@@ -13,9 +13,7 @@ import numpy as np
 
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, jit
-from tcs.kernel.motion.leaves import contact_here
-from tcs.kernel.motion.near_lists import append_below, list_near
-from tcs.kernel.motion.pairs import (
+from tcs.kernel.motion.contact_bounds import (
     ROUNDING,
     count_hit,
     is_near,
@@ -23,8 +21,9 @@ from tcs.kernel.motion.pairs import (
     is_of_groups,
     take_posture,
 )
-from tcs.kernel.motion.planes import take_twists
+from tcs.kernel.motion.near_pairs import append_below, contact_here, list_near
 from tcs.kernel.motion.scene import LISTED, NO_PAIR, WIDE, MotionScene, MotionWorkspace
+from tcs.kernel.motion.separating_planes import take_twists
 from tcs.kernel.views import unowned
 
 RESOLUTION = 1e-5

@@ -113,7 +113,7 @@ class ShapePairs(NamedTuple):
     come before those; shape (n_arm,)."""
     below: IntArray
     """First and one after the last of the pairs below each pair, equal if there are none; shape
-    (n_pairs, 2), or (0, 2) without groups. They are apart if the pair is, see `groups`."""
+    (n_pairs, 2), or (0, 2) without groups. They are apart if the pair is, see `box_trees`."""
     centre: FloatArray
     """Centre in A of the fixed shape of each pair that is checked always [m], shape
     (3, those pairs); 0 where both move."""
@@ -175,8 +175,8 @@ class PieceMotion(NamedTuple):
     """Motion on the current piece of a curve, whose middle is the current posture."""
 
     known: IntArray
-    """1 if joints move on the piece, `planes.TWISTED` if their motion to first order is known too,
-    else 0; shape (1,)."""
+    """1 if joints move on the piece, `separating_planes.TWISTED` if their motion to first order is
+    known too, else 0; shape (1,)."""
     delta: FloatArray
     """Greatest distance of each joint from the current posture [rad], shape (7,)."""
     rate: FloatArray
@@ -190,7 +190,7 @@ class PieceMotion(NamedTuple):
     """Bound on how far any point of a shape is from where its twist at the middle posture leads to,
     relative to each link before its own [m], shape (n_arm, 8 + coupled)."""
     twist: FloatArray
-    """Motion of the links on half of the piece, see `planes`, shape (8 + coupled, 6)."""
+    """Motion of the links on half of the piece, see `separating_planes`, shape (8 + coupled, 6)."""
     line: FloatArray
     """Straight motion of the tool on the current curve, see `tool_line`, shape (5,)."""
     tool_twist: FloatArray
@@ -238,7 +238,7 @@ class Separation(NamedTuple):
     link's origin from its centre along them, and the half sizes of its core [m], shape (5, 3)."""
     between: FloatArray
     """Axes of a link's frame and its origin along the axes of boxes around fixed shapes, and these
-    axes in A, see `group_boxes`, shape (3, 7)."""
+    axes in A, see `near_pairs`, shape (3, 7)."""
 
 
 class FoundContacts(NamedTuple):
@@ -384,7 +384,7 @@ def goal_from_arm_base(problem: Problem, row: Rows, goal: int) -> tuple[FloatArr
 
 
 def carriers(problem: Problem) -> IntArray:
-    """Return what carries each fixed shape of a scene, shape (n_fixed,), as `groups` takes it.
+    """Return what carries each fixed shape of a scene, shape (n_fixed,), as `grouped` takes it.
 
     Shapes of the environment are grouped with no others, those of the robot by their mount.
     """

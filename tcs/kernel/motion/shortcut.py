@@ -5,9 +5,15 @@ from __future__ import annotations
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, jit
 from tcs.kernel.motion.edges import edge_is_certified, edge_seems_free
-from tcs.kernel.motion.random import uniform
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
-from tcs.kernel.motion.trees import MOST_POINTS, Trees, distance, edge_length, unwound
+from tcs.kernel.motion.search_trees import (
+    MOST_POINTS,
+    Trees,
+    distance,
+    edge_length,
+    uniform,
+    unwound,
+)
 from tcs.kernel.views import unowned
 
 LEAST_GAIN = 0.05

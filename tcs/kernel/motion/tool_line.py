@@ -69,7 +69,7 @@ def line_motion(work: MotionWorkspace) -> float:
 
 @inner
 def take_turns(scene: MotionScene, work: MotionWorkspace, half: float) -> None:
-    """Fill `piece.tool_twist`, as `planes.take_twists` does `twist`.
+    """Fill `piece.tool_twist`, as `separating_planes.take_twists` does `twist`.
 
     Args:
         scene: The scene.

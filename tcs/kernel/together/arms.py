@@ -21,7 +21,7 @@ from tcs.kernel.dexterity.measures import measure_at, rounded_inward
 from tcs.kernel.freedom.forms import FEWEST_JOINTS, pose_of
 from tcs.kernel.group_contacts import groups_touch
 from tcs.kernel.kinematics import link_poses
-from tcs.kernel.motion.postures import postures_at
+from tcs.kernel.motion.goal_postures import postures_at
 from tcs.kernel.problem import Problem, gaps_between
 from tcs.kernel.rows import Rows
 from tcs.kernel.six_joints.pairs import new_six_joint_solver

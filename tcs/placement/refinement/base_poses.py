@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tcs.errors import TcsError
 from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
 from tcs.kernel.motion.edges import certified
-from tcs.kernel.motion.postures import postures_at
+from tcs.kernel.motion.goal_postures import postures_at
 from tcs.kernel.motion.scene import goal_from_arm_base, motion_scene, new_motion_workspace
 from tcs.kernel.problem import Goals, Problem, build_problem
 from tcs.kernel.rows import Rows, single_row

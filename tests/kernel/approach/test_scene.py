@@ -6,7 +6,7 @@ import numpy as np
 
 from tcs.kernel.approach.scene import approach_scene
 from tcs.kernel.collide import CENTRE
-from tcs.kernel.motion.idle import needed_pairs
+from tcs.kernel.motion.never_in_contact import needed_pairs
 from tcs.kernel.motion.scene import torso_scene
 from tcs.kernel.problem import build_problem
 from tests.kernel.arms import drake_arm

@@ -7,12 +7,12 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 
 from tcs.kernel.motion.edges import NO_PAIR, certified, posture_contact
-from tcs.kernel.motion.postures import postures_at
+from tcs.kernel.motion.goal_postures import postures_at
 from tcs.kernel.motion.scene import FRAMES, motion_scene, new_motion_workspace
 from tcs.kernel.motion.straight import DONE, OFF_LINE, new_straight_workspace, straight_motion
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import rows_at
-from tests.kernel.motion.test_planes import judge
+from tests.kernel.motion.test_separating_planes import judge
 from tests.kernel.motion.toys import HERE, prepared, within_limits
 from tests.kernel.test_five_joints import AXIS, TURN, five_joint_chain
 from tests.kernel.test_sliding_arms import ORDERS, sliding_chain

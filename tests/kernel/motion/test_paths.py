@@ -10,8 +10,8 @@ import pytest
 from tcs.kernel.arrays import BOX
 from tcs.kernel.motion.connect import connect
 from tcs.kernel.motion.edges import NO_PAIR, certified, posture_contact
+from tcs.kernel.motion.search_trees import new_trees
 from tcs.kernel.motion.shortcut import shorten
-from tcs.kernel.motion.trees import new_trees
 from tests.kernel.arms import drake_arm
 from tests.kernel.motion.toys import HERE, SWING, bare, prepared, within_limits
 from tests.kernel.shapes import placed

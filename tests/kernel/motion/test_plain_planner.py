@@ -9,7 +9,7 @@ import pytest
 
 from tcs.kernel.motion.connect import connect
 from tcs.kernel.motion.edges import NO_PAIR, posture_contact
-from tcs.kernel.motion.trees import new_trees
+from tcs.kernel.motion.search_trees import new_trees
 from tests.chosen import some_of
 from tests.kernel.arms import drake_arm
 from tests.kernel.motion.plain_planner import plain_path

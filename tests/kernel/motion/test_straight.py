@@ -9,7 +9,7 @@ from scipy.interpolate import CubicHermiteSpline
 from tcs.kernel.arrays import BOX
 from tcs.kernel.collide import SIZE
 from tcs.kernel.motion.edges import NO_PAIR, posture_contact
-from tcs.kernel.motion.postures import postures_at
+from tcs.kernel.motion.goal_postures import postures_at
 from tcs.kernel.motion.straight import (
     BLOCKED,
     DONE,

@@ -6,7 +6,7 @@ import numpy as np
 
 from tcs.kernel.cache import jit
 from tcs.kernel.motion.connect import BEYOND, LOCAL, _draw_target
-from tcs.kernel.motion.trees import new_trees
+from tcs.kernel.motion.search_trees import new_trees
 from tests.kernel.arms import drake_arm
 from tests.kernel.motion.test_paths import walled
 from tests.kernel.motion.toys import prepared

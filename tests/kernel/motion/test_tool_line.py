@@ -8,10 +8,10 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
+from tcs.kernel.motion.contact_bounds import place_shape, take_posture
 from tcs.kernel.motion.edges import take_middle
-from tcs.kernel.motion.pairs import place_shape, take_posture
-from tcs.kernel.motion.planes import take_twists
 from tcs.kernel.motion.scene import SEEN_FROM_TOOL
+from tcs.kernel.motion.separating_planes import take_twists
 from tcs.kernel.motion.straight import (
     LIMITS,
     OFF_LINE,
@@ -23,7 +23,7 @@ from tcs.kernel.motion.tool_line import take_line
 from tcs.kernel.views import unowned
 from tests.chosen import some_of
 from tests.kernel.arms import drake_arm
-from tests.kernel.motion.test_planes import corners
+from tests.kernel.motion.test_separating_planes import corners
 from tests.kernel.motion.toys import bare, prepared, within_limits
 from tests.reference.kinematics import link_poses
 

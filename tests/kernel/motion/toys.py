@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tcs.kernel.motion.idle import without_idle_pairs
+from tcs.kernel.motion.never_in_contact import with_needed_pairs
 from tcs.kernel.motion.scene import motion_scene, new_motion_workspace
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import rows_at
@@ -20,7 +20,7 @@ SWING = np.array([[0.9, 0.0, 0.0, -0.5, 0.0, -0.3, 0.0], [-0.7, 0.0, 0.0, -0.5, 
 
 def prepared(scene, h=HERE):
     """Return a motion scene, its workspace and the scene as the reference reads it."""
-    ready = without_idle_pairs(motion_scene(build_problem(scene), rows_at(toy_grid(), [h])))
+    ready = with_needed_pairs(motion_scene(build_problem(scene), rows_at(toy_grid(), [h])))
     return ready, new_motion_workspace(ready), placed_scene(scene, toy_grid(), h, 0)[0]
 
 

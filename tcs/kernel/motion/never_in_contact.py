@@ -16,8 +16,8 @@ import numpy as np
 from tcs.kernel.arrays import BOX, CAPSULE, BoolArray, FloatArray, IntArray
 from tcs.kernel.cache import inner, jit
 from tcs.kernel.collide import CENTRE, ROTATION, SIZE, TYPE
-from tcs.kernel.motion.box_tree import NONE, boxes_between, extents
-from tcs.kernel.motion.pairs import is_near, take_posture
+from tcs.kernel.motion.box_trees import NONE, boxes_between, extents
+from tcs.kernel.motion.contact_bounds import is_near, take_posture
 from tcs.kernel.motion.scene import (
     FRAMES,
     MotionScene,
@@ -40,13 +40,13 @@ IN_BOX = 16
 """Number of shapes that one box encloses at any angle of a joint."""
 
 
-def without_idle_pairs(scene: MotionScene) -> MotionScene:
+def with_needed_pairs(scene: MotionScene) -> MotionScene:
     """Return a scene, one without groups, without the pairs that never touch."""
     return with_pairs(scene, needed_pairs(scene, np.ones(len(scene.pairs.members), np.bool_)))
 
 
 def needed_pairs(scene: MotionScene, checked: BoolArray) -> BoolArray:
-    """Return which pairs are needed, shape (n_pairs,): all but idle ones of those `checked`.
+    """Return which pairs are needed, shape (n_pairs,): all but those of `checked` that never touch.
 
     Args:
         scene: A scene without groups.

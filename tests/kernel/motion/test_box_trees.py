@@ -8,10 +8,9 @@ import pytest
 from tcs.kernel.approach.scene import approach_scene
 from tcs.kernel.arrays import BOX, CAPSULE
 from tcs.kernel.collide import BOUND, CENTRE, ROTATION, SIZE, TYPE
-from tcs.kernel.motion.box_tree import NONE, boxes_around
+from tcs.kernel.motion.box_trees import NONE, boxes_around, grouped
 from tcs.kernel.motion.edges import NO_PAIR, certified, posture_contact
-from tcs.kernel.motion.groups import grouped
-from tcs.kernel.motion.idle import without_idle_pairs
+from tcs.kernel.motion.never_in_contact import with_needed_pairs
 from tcs.kernel.motion.scene import (
     carriers,
     motion_scene,
@@ -22,7 +21,7 @@ from tcs.kernel.motion.scene import (
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import rows_at
 from tests.kernel.arms import drake_arm
-from tests.kernel.motion.test_planes import corners, place
+from tests.kernel.motion.test_separating_planes import corners, place
 from tests.kernel.motion.toys import HERE, within_limits
 from tests.kernel.shapes import rotation
 from tests.kernel.toy import toy_grid, toy_scene
@@ -63,7 +62,7 @@ def many(chain):
 @pytest.fixture(scope="module")
 def plain(many):
     """Return that scene, prepared at one configuration."""
-    return without_idle_pairs(motion_scene(build_problem(many), rows_at(toy_grid(), [HERE])))
+    return with_needed_pairs(motion_scene(build_problem(many), rows_at(toy_grid(), [HERE])))
 
 
 def extremes(row):

@@ -8,7 +8,7 @@ import pytest
 from tcs.kernel.arrays import SPHERE
 from tcs.kernel.distances import DistanceTables
 from tcs.kernel.motion.edges import NO_PAIR, posture_contact
-from tcs.kernel.motion.idle import MOST_BETWEEN, needed_pairs
+from tcs.kernel.motion.never_in_contact import MOST_BETWEEN, needed_pairs
 from tcs.kernel.motion.scene import motion_scene, new_motion_workspace, with_pairs
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import rows_at

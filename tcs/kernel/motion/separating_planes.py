@@ -5,8 +5,8 @@ middle posture gives; their second derivative bounds the rest. So a plane that k
 apart at the middle posture keeps them apart on the piece if it does so at both ends to first order,
 with the rest to spare: to first order the points move evenly, and how far a convex shape extends
 beyond a plane is a convex function of the time. Motion along the plane does not count, unlike in
-the bounds of `pairs`, nor does motion away from it before or after the middle: a tool that slides
-along a shelf, or leaves it, is certified in longer pieces.
+the bounds of `contact_bounds`, nor does motion away from it before or after the middle: a tool
+that slides along a shelf, or leaves it, is certified in longer pieces.
 """
 
 from __future__ import annotations

@@ -8,9 +8,9 @@ distance d from the axis of joint k moves by at most `delta_k d` when that joint
 `delta_k` if it is prismatic; and its
 distance from the axis has grown by no more than the motion before (Schwarzer, Saha, Latombe 2005
 bound the motion of all postures at once, which is looser). Where the twist of the link at the
-middle posture is known, and what it leaves, `planes`, the motion from there is bounded by their sum
-too. Where the tool follows a straight line, `tool_line`, so is the motion of the last links by the
-joints between them and the tool.
+middle posture is known, and what it leaves, `separating_planes`, the motion from there is bounded
+by their sum too. Where the tool follows a straight line, `tool_line`, so is the motion of the last
+links by the joints between them and the tool.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from tcs.kernel.cache import inner
 from tcs.kernel.collide import BOUND, CENTRE, ROTATION, SIZE, TYPE, closer, move, spheres_overlap
 from tcs.kernel.distances import distance_bound
 from tcs.kernel.motion.link_poses import place_links, place_turned
-from tcs.kernel.motion.planes import TWISTED, plane_between
 from tcs.kernel.motion.scene import FRAMES, SEEN_FROM_TOOL, MotionScene, MotionWorkspace
+from tcs.kernel.motion.separating_planes import TWISTED, plane_between
 from tcs.kernel.motion.tool_line import follows_line, line_motion, off_line
 
 COARSE = 0.02

@@ -10,9 +10,9 @@ import pytest
 
 from tcs.kernel.arrays import BOX, CAPSULE
 from tcs.kernel.collide import CENTRE, ROTATION, SIZE, TYPE
+from tcs.kernel.motion.contact_bounds import is_near, place_shape, take_posture
 from tcs.kernel.motion.edges import take_middle
-from tcs.kernel.motion.pairs import is_near, place_shape, take_posture
-from tcs.kernel.motion.planes import plane_between, take_twists
+from tcs.kernel.motion.separating_planes import plane_between, take_twists
 from tcs.kernel.views import unowned
 from tests.kernel.arms import drake_arm
 from tests.kernel.motion.toys import toy, within_limits

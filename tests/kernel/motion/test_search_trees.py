@@ -6,8 +6,15 @@ import numpy as np
 import pytest
 
 from tcs.kernel.motion.connect import connect
-from tcs.kernel.motion.nearest import BLOCKED, COUNTED, count_blocked, nearest, place_node
-from tcs.kernel.motion.trees import CHUNK, new_trees
+from tcs.kernel.motion.search_trees import (
+    BLOCKED,
+    CHUNK,
+    COUNTED,
+    count_blocked,
+    nearest,
+    new_trees,
+    place_node,
+)
 from tests.kernel.arms import drake_arm
 from tests.kernel.motion.test_paths import walled
 from tests.kernel.motion.toys import SWING, prepared

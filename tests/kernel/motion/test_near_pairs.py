@@ -7,10 +7,10 @@ import numpy as np
 from tcs.kernel.arrays import BOX
 from tcs.kernel.cache import jit
 from tcs.kernel.collide import BOUND, CENTRE, ROTATION, SIZE, TYPE
-from tcs.kernel.motion.group_boxes import boxes_apart, take_frames
+from tcs.kernel.motion.near_pairs import boxes_apart, take_frames
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
 from tests.kernel.arms import drake_arm
-from tests.kernel.motion.test_planes import corners
+from tests.kernel.motion.test_separating_planes import corners
 from tests.kernel.motion.toys import toy
 from tests.kernel.shapes import rotation
 
