@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 from collections import defaultdict
 
@@ -277,6 +278,35 @@ def test_the_digest_changes_with_what_is_scored_and_with_nothing_else(
     digests.add(lower(scene, shaving, short).digest())
     assert len(digests) == 5
     assert all(len(digest) == 64 for digest in digests)
+
+
+def leaves(item, path=()):
+    """Yield the names that lead to each array or number of nested named tuples."""
+    if isinstance(item, tuple):
+        for name in item._fields:
+            yield from leaves(getattr(item, name), (*path, name))
+    else:
+        yield path
+
+
+def changed(item, path):
+    """Return nested named tuples of which one array or number is another."""
+    if not path:
+        array = np.asarray(item)
+        return ~array if array.dtype == np.bool_ else array + array.dtype.type(1)
+    name, *rest = path
+    return item._replace(**{name: changed(getattr(item, name), rest)})
+
+
+def test_the_digest_changes_with_every_part(lowered):
+    digest, same = lowered.digest(), []
+    for part in ("arrays", "grid"):
+        whole = getattr(lowered, part)
+        for path in leaves(whole):
+            other = dataclasses.replace(lowered, **{part: changed(whole, path)})
+            if np.size(functools.reduce(getattr, path, whole)) and other.digest() == digest:
+                same.append(path)
+    assert same == []
 
 
 def test_the_arrays_cannot_be_written_to(lowered):

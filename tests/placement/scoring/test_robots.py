@@ -9,6 +9,7 @@ from tcs.model.robots import load_robot, robot_names
 from tcs.model.scene import load_environment
 from tcs.placement.scoring import load_job, score
 from tcs.placement.tables import Reason
+from tests.environments import write_environment
 
 
 @pytest.mark.parametrize("name", robot_names())
@@ -36,3 +37,12 @@ def test_a_wider_contact_margin_leaves_self_collision_as_it_is(small_environment
     touched = {after.pair_names[i][1] for i in after.pair[lost]}
     assert all(name.startswith(("wheelchair::", "person::", "floor")) for name in touched)
     assert lost.sum() < 0.02 * (before.reason == Reason.REACHED).sum()
+
+
+def test_the_forearm_of_the_ur5_passes_the_head(tmp_path):
+    """Shapes that protruded by up to 8 mm refused this posture, which its meshes clear."""
+    axes = {"base_x": 0.6, "base_y": -0.75, "base_yaw": 0, "torso": 0}
+    grid = {axis: (start, 1, 1) for axis, start in axes.items()}
+    environment = write_environment(tmp_path, "beside", grid)
+    scores = score("shaving", environment, "ur5", approach=False).nominal.scores
+    assert scores.reason[0, 1] == Reason.REACHED
