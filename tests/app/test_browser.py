@@ -143,9 +143,15 @@ def test_a_click_moves_the_robot_and_why_explains(page):
     page.wait(lambda: script(POSE)[:2] != before[:2])
     why = page.driver.find_elements("css selector", "#goals button")
     assert why
-    script("arguments[0].click()", why[0])
+    # The command that says the same names the goal by its number.
+    number = "return 1 + [...document.querySelectorAll('#goals li')].indexOf(arguments[0])"
+    goal = script(number, why[-1].find_element("xpath", "ancestor::li"))
+    assert goal > 1
+    script("arguments[0].click()", why[-1])
     page.wait(lambda: not script("return document.getElementById('why').hidden"))
     assert script("return document.activeElement.id") == "why"
+    command = script("return document.getElementById('command').textContent")
+    assert f" --goal {goal} --here " in command.splitlines()[-1]
 
 
 def test_a_card_says_why_it_is_recommended_and_how_long_it_takes(page):
@@ -307,8 +313,22 @@ def test_what_is_not_checked_is_in_view_and_files_are_in_the_header(page):
     assert not script("return document.getElementById('shared').innerText")
     script("document.getElementById('share').click()")
     page.wait(lambda: "copied" in script("return document.getElementById('shared').innerText"))
+    # It is not of the set beside it, which begins where the robot is now.
+    report = script("return document.getElementById('report').textContent")
+    assert report == "Report of the recommended set"
     for name in ("report", "download", "downloadEnvironment", "page3d"):
         assert page.driver.find_element("css selector", f"header #{name}").is_displayed()
+
+
+def test_what_is_beside_the_grid_is_told_from_where_nothing_is_reached(page):
+    shown = (
+        "return ['#map', '.legend .outside', '.legend .zero']"
+        ".map(one => getComputedStyle(document.querySelector(one)).backgroundImage)"
+    )
+    beside, key, nothing = page.driver.execute_script(shown)
+    assert beside == key
+    assert "gradient" in beside
+    assert nothing == "none"
 
 
 def test_bodies_have_names_for_readers(page):
