@@ -19,7 +19,7 @@ import tcs
 from tcs.files.writing import make_folder
 from tcs.model.people import draw_bodies
 from tcs.output.words import goal_text, percentage
-from tcs.output.words.population import part_text
+from tcs.output.words.success import part_text
 from tcs.placement.population import Population
 from tcs.placement.scoring import default_path
 

@@ -6,7 +6,7 @@ from importlib.resources import files
 
 from fastapi import FastAPI, Response
 
-from tcs.service.http.problems import problem
+from tcs.service.http.description import problem
 
 LANGUAGES = ("en", "de")
 """Languages of the page; the texts of each are in one file."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tcs.cli import options
-from tcs.cli.option_groups import expand_options
+from tcs.cli.options import expand_options
 from tcs.files.writing import check_writable
 from tcs.output import terminal
 from tcs.output.terminal import perception_tables

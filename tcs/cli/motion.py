@@ -95,7 +95,7 @@ def plan(
     from tcs.motion.plan_files import check_plan_path
     from tcs.motion.plans import exact_state
     from tcs.output.report.score.shown_set import ShownSet
-    from tcs.output.terminal.motion_tables import report_plan
+    from tcs.output.terminal.set_tables import report_plan
     from tcs.placement.selection import nearest_table
 
     if out is not None:
@@ -188,7 +188,7 @@ def motions(
     import tcs
     from tcs.files.writing import check_writable
     from tcs.motion.examine import examination
-    from tcs.output.terminal.motion_tables import report_motions
+    from tcs.output.terminal.set_tables import report_motions
     from tcs.placement.selection import nearest_table
     from tcs.placement.store import motion_path, save_motions
 
@@ -219,7 +219,7 @@ def motions(
 def verify_plan(path: Path, *, as_json: bool) -> None:
     """Re-check a plan with Drake; exit with 1 if it does not hold."""
     from tcs.motion import check_plan, load_plan
-    from tcs.output.terminal.motion_tables import report_plan_check
+    from tcs.output.terminal.set_tables import report_plan_check
 
     plan = load_plan(path)
     with terminal.progress_bar("segments") as on_progress:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tcs.cli import options
-from tcs.cli.option_groups import expand_options
+from tcs.cli.options import expand_options
 from tcs.cli.robustness import table_of
 from tcs.output import terminal
 
@@ -119,7 +119,7 @@ def population(
     who.check()
     kept = options.block_folder(blocks, restart)
     import tcs
-    from tcs.output.terminal import population_tables
+    from tcs.output.terminal import set_tables
 
     if map_to is not None:
         from tcs.files.writing import check_writable
@@ -148,4 +148,4 @@ def population(
 
         save_figure(map_to, population_figure(found))
     result = found.to_json() | ({} if map_to is None else {"map": str(map_to)})
-    terminal.print_result(result, population_tables.report_population, as_json=as_json)
+    terminal.print_result(result, set_tables.report_population, as_json=as_json)

@@ -54,7 +54,7 @@ def refine(
     """
     import tcs
     from tcs.files.writing import check_writable
-    from tcs.output.terminal.refinement_tables import report_refined
+    from tcs.output.terminal.set_tables import report_refined
     from tcs.placement.refinement import refinement_summary
 
     path = out or file

@@ -10,7 +10,7 @@ import typer
 from tcs.cli import options
 from tcs.cli.values import observed_settings
 from tcs.output import terminal
-from tcs.output.terminal import robustness_tables
+from tcs.output.terminal import set_tables
 
 if TYPE_CHECKING:
     from tcs.placement.store import ScoreFile
@@ -115,7 +115,7 @@ def evaluate(
             jobs=jobs,
             on_compile=terminal.note_compiling,
         )
-        terminal.print_result(found.to_json(), robustness_tables.report_evaluation, as_json=as_json)
+        terminal.print_result(found.to_json(), set_tables.report_evaluation, as_json=as_json)
         return
     with terminal.progress_bar("configurations in samples") as on_progress:
         found = tcs.evaluate(
@@ -132,7 +132,7 @@ def evaluate(
             on_progress=on_progress,
             on_compile=terminal.note_compiling,
         )
-    terminal.print_result(found.to_json(), robustness_tables.report_evaluation, as_json=as_json)
+    terminal.print_result(found.to_json(), set_tables.report_evaluation, as_json=as_json)
 
 
 def robustify(
@@ -185,7 +185,7 @@ def robustify(
         )
         tcs.save(path, done)
     result = {"file": str(path), **success_summary(done)}
-    terminal.print_result(result, robustness_tables.report_robustified, as_json=as_json)
+    terminal.print_result(result, set_tables.report_robustified, as_json=as_json)
 
 
 def evaluate_plan_file(
@@ -204,7 +204,7 @@ def evaluate_plan_file(
             replan=replan,
             on_progress=on_progress,
         )
-    terminal.print_result(found.to_json(), robustness_tables.report_plan_success, as_json=as_json)
+    terminal.print_result(found.to_json(), set_tables.report_plan_success, as_json=as_json)
 
 
 def table_of(loaded: ScoreFile, observed: list[str] | None) -> int | None:

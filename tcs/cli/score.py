@@ -11,11 +11,11 @@ import typer
 
 from tcs.cli import options
 from tcs.cli.motion import verify_plan
-from tcs.cli.option_groups import expand_options
+from tcs.cli.options import expand_options
 from tcs.cli.refinement import refined_in_place
 from tcs.output import terminal
 from tcs.output.terminal import tables
-from tcs.output.terminal.refinement_tables import report_refined
+from tcs.output.terminal.set_tables import report_refined
 
 if TYPE_CHECKING:
     from tcs.motion import ApproachCheck

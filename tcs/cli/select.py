@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tcs.cli import options, robustness
-from tcs.cli.option_groups import expand_options
+from tcs.cli.options import expand_options
 from tcs.output import terminal
 from tcs.output.terminal import tables
 

@@ -16,7 +16,7 @@ from urllib.parse import urlencode
 import typer
 
 from tcs.cli import options
-from tcs.cli.option_groups import expand_options
+from tcs.cli.options import expand_options
 from tcs.output import terminal
 
 if TYPE_CHECKING:

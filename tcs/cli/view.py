@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from tcs.cli import options
-from tcs.cli.option_groups import expand_options
+from tcs.cli.options import expand_options
 from tcs.cli.serve import open_page
 from tcs.output import terminal
 from tcs.output.terminal import tables

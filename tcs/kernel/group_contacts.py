@@ -9,7 +9,7 @@ from __future__ import annotations
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner
 from tcs.kernel.collide import closer, sphere_is_near, spheres_overlap
-from tcs.kernel.groups import ShapeGroups
+from tcs.kernel.shape_groups import ShapeGroups
 
 
 @inner

@@ -20,8 +20,8 @@ from tcs.kernel.collide import (
     square_beyond,
 )
 from tcs.kernel.group_contacts import first_touching
-from tcs.kernel.groups import ShapeGroups
 from tcs.kernel.problem import Problem
+from tcs.kernel.shape_groups import ShapeGroups
 from tcs.kernel.workspace import Workspace, place_link, place_shapes
 
 

@@ -29,8 +29,8 @@ from tcs.kernel.freedom.goals import (
     free_turn,
     no_freedom,
 )
-from tcs.kernel.groups import ShapeGroups, groups_of, with_boxes, with_group_rows
 from tcs.kernel.resting import resting_arm
+from tcs.kernel.shape_groups import ShapeGroups, groups_of, with_boxes, with_group_rows
 
 UNCHECKED = -1.0
 """Gap of a pair of shapes that is not checked."""

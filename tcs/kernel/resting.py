@@ -6,7 +6,7 @@ import numpy as np
 
 from tcs.kernel.arrays import SPHERE, Chain, FloatArray, IntArray, SceneArrays
 from tcs.kernel.collide import BOUND, CENTRE, COLUMNS, SIZE, TYPE, pack
-from tcs.kernel.groups import ShapeGroups, with_boxes
+from tcs.kernel.shape_groups import ShapeGroups, with_boxes
 
 
 def resting_arm(

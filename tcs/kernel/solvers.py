@@ -2,9 +2,10 @@
 
 A solver is a named tuple of constants and scratch memory: `analytic.search.Search` for an arm of
 seven joints with a closed form, `numeric.search.NumericSolver` for one without,
-`six_joints.pairs.SixJointSolver` for an arm of six joints and `five_joints.pairs.FiveJointSolver`
-for one of five. `out_of_reach`, `score_pair` and others select the implementation by the type of
-the solver when numba compiles their caller, so a sweep compiles the code of its own solver only.
+`six_joints.score_solutions.SixJointSolver` for an arm of six joints and
+`five_joints.score_turned.FiveJointSolver` for one of five. `out_of_reach`, `score_pair` and others
+select the implementation by the type of the solver when numba compiles their caller, so a sweep
+compiles the code of its own solver only.
 """
 
 from __future__ import annotations
@@ -14,21 +15,21 @@ from typing import Any, ClassVar
 import numba
 from numba.core.typing.templates import AbstractTemplate, infer_global
 
-from tcs.kernel.analytic import pairs as analytic
+from tcs.kernel.analytic import score_pair as analytic
 from tcs.kernel.analytic.scratch import Search, new_search
 from tcs.kernel.analytic.solver import is_outside
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.base_pose import pose_in_arm_base
 from tcs.kernel.cache import inner
 from tcs.kernel.contacts import NO_CONTACT, gripper_body_contact
-from tcs.kernel.five_joints import pairs as five_joints
-from tcs.kernel.five_joints.pairs import FiveJointSolver, new_five_joint_solver
-from tcs.kernel.numeric import pairs as numeric
+from tcs.kernel.five_joints import score_turned as five_joints
+from tcs.kernel.five_joints.score_turned import FiveJointSolver, new_five_joint_solver
+from tcs.kernel.numeric import score_curves as numeric
 from tcs.kernel.numeric.search import NumericSolver, new_numeric_solver
 from tcs.kernel.problem import Problem
 from tcs.kernel.scores import GRIPPER_BLOCKED_BY_ROBOT, REACHED, TOO_FAR
-from tcs.kernel.six_joints import pairs as six_joints
-from tcs.kernel.six_joints.pairs import SixJointSolver, new_six_joint_solver
+from tcs.kernel.six_joints import score_solutions as six_joints
+from tcs.kernel.six_joints.score_solutions import SixJointSolver, new_six_joint_solver
 from tcs.kernel.views import tuple_class
 from tcs.kernel.workspace import Workspace
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from tcs.errors import ServiceError
-from tcs.files.json_values import without_infinities
+from tcs.files.plain import without_infinities
 from tcs.output.words import choice_in_words, explanation_in_words, goal_index
 from tcs.placement.constraints import scored_entries
 from tcs.placement.reasons import explain, fix_weights

@@ -38,12 +38,12 @@ from tcs.service.requests import (
 from tcs.service.responses import FileEntry, JobStatus
 from tcs.service.scene_processes import OfFile, SceneProcess
 from tcs.service.score_files import ScoreFiles
-from tcs.service.sent_content import request_of
+from tcs.service.sent_documents import request_of
 from tcs.service.views import Views
 from tcs.service.worker import WorkerPool
 
 _DEFAULT_LIMITS = Limits()
-_PARSING = ("tcs.service.answers", "tcs.service.sent_content", "tcs.service.requests")
+_PARSING = ("tcs.service.answers", "tcs.service.sent_documents", "tcs.service.requests")
 """What the processes import that read what clients send."""
 _NAMES: dict[type[Any], str] = {
     ScoreRequest: "score",

@@ -138,8 +138,7 @@ class ScenePostures:
 
     def _scene(self, digest: str, file: ScoreFile) -> tuple[_ShownScene, ...]:
         """Return the scene of each hand of a file, built when it is first looked at."""
-        from tcs.output.report.score.scored_scenes import scored_scenes
-        from tcs.output.report.score.shown_set import ShownSet
+        from tcs.output.report.score.shown_set import ShownSet, scored_scenes
 
         if digest not in self._scenes:
             shown = ShownSet(None, (), (), file.nominal_index, "", file)

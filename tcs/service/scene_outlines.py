@@ -13,8 +13,7 @@ from tcs.model.scene import EnvironmentFile, Scene, goal_poses
 from tcs.model.scene.environment.environment_file import WORLD
 from tcs.model.scene.pieces import PIECES
 from tcs.output.report.score.scene_solids import base_outline, environment_parts, part_solid
-from tcs.output.report.score.scored_scenes import scored_scenes
-from tcs.output.report.score.shown_set import ShownSet
+from tcs.output.report.score.shown_set import ShownSet, scored_scenes
 from tcs.placement.store import ScoreFile
 from tcs.service.jobs import Progress
 

@@ -17,7 +17,7 @@ from typing import Any
 
 from tcs.errors import BusyError, EnvironmentFileError, TcsError
 from tcs.files.documents import checked
-from tcs.files.json_values import without_infinities
+from tcs.files.plain import without_infinities
 from tcs.files.writing import make_private_folder
 from tcs.output.words import goal_index
 from tcs.placement.store import MotionFile, ScoreFile

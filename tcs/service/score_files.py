@@ -26,7 +26,7 @@ from tcs.placement.store import (
 )
 from tcs.service.limits import Limits
 from tcs.service.responses import FileEntry
-from tcs.service.sent_content import entry_of, entry_of_file
+from tcs.service.sent_documents import entry_of, entry_of_file
 from tcs.service.worker import WorkerPool
 
 

@@ -19,7 +19,7 @@ def test_sets_are_counted_for_people(tcs_command, corner, tmp_path):
     assert {"served", "ci95", "sets", "not_served"} <= set(found)
     assert picture.stat().st_size > 10_000
 
-    from tcs.output.terminal.population_tables import report_population
+    from tcs.output.terminal.set_tables import report_population
 
     report_population(found)
 

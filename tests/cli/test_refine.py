@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tcs
-from tcs.output.terminal.refinement_tables import report_refined
+from tcs.output.terminal.set_tables import report_refined
 from tcs.placement.refinement import refinement_summary
 from tests.placement.refinement.test_refine import BESIDE
 

@@ -8,8 +8,8 @@ from types import FunctionType
 import pytest
 
 import tcs
-from tcs.kernel.analytic.pairs import score_pair
 from tcs.kernel.analytic.samples import measure_samples
+from tcs.kernel.analytic.score_pair import score_pair
 from tcs.kernel.dexterity.measures import isotropy_at, limit_penalty
 from tcs.placement.selection import select, shortest_tour, utility
 from tcs.placement.tables import tc_manipulability, tc_reachability

@@ -9,7 +9,7 @@ from tcs.kernel.arrays import BOX, CAPSULE, SPHERE
 from tcs.kernel.cache import jit
 from tcs.kernel.collide import BOUND, CENTRE, ROTATION, SIZE, TYPE, closer, pack
 from tcs.kernel.group_contacts import group_touches, groups_touch
-from tcs.kernel.groups import CLUSTER, groups_of, with_boxes, with_group_rows
+from tcs.kernel.shape_groups import CLUSTER, groups_of, with_boxes, with_group_rows
 from tests.chosen import some_of
 from tests.kernel.shapes import as_shapes, placed, random_size, rotation
 

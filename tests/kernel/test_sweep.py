@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tcs.kernel import groups
+from tcs.kernel import shape_groups
 from tcs.kernel.arrays import BOX, SPHERE, GridArrays
 from tcs.kernel.problem import build_problem
 from tcs.kernel.scores import (
@@ -73,7 +73,7 @@ def test_clusters_of_a_body_with_many_shapes_change_no_score(lowered, seed, monk
     assert max(np.diff(build_problem(scene).links.groups.clusters)) > 2
     scores = scores_of(scene, grid)
     compare(scene, grid, scores, stratified(rng, scores.reason, 1))
-    monkeypatch.setattr(groups, "CLUSTER", len(scene.body.type))
+    monkeypatch.setattr(shape_groups, "CLUSTER", len(scene.body.type))
     assert max(np.diff(build_problem(scene).body.groups.clusters)) == 1
     whole = scores_of(scene, grid)
     for name in ("reason", "contact", "dexterity", "joints"):

@@ -17,7 +17,7 @@ from tcs.model.tasks import TOOL_SPEED
 from tcs.motion import Stop, Timed, check_plan, load_plan, save_plan
 from tcs.motion.plan_check import LIMIT_BAR, _jumps
 from tcs.motion.recheck import _is_within_limits
-from tcs.output.terminal.motion_tables import report_plan_check
+from tcs.output.terminal.set_tables import report_plan_check
 from tcs.placement.scoring.rebuild import rebuild_scenes
 
 

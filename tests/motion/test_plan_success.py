@@ -15,7 +15,7 @@ from tcs.model.scene import ErrorDistribution
 from tcs.motion import evaluate_plan, save_plan
 from tcs.motion.plan_check import hands_of
 from tcs.motion.plan_success import _Place
-from tcs.output.terminal.robustness_tables import report_plan_success
+from tcs.output.terminal.set_tables import report_plan_success
 
 
 def off(joint, std):

@@ -19,7 +19,7 @@ from tcs.model.tasks import TOOL_SPEED
 from tcs.motion import Stop, recheck, save_plan
 from tcs.motion.recheck import false_pieces
 from tcs.motion.stop_tour import _Tour
-from tcs.output.terminal.motion_tables import report_plan
+from tcs.output.terminal.set_tables import report_plan
 from tcs.placement.scoring.rebuild import rebuild_scenes
 
 

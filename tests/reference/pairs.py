@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tcs.kernel.analytic.pairs import REFINE_SAMPLES, REFINEMENTS
+from tcs.kernel.analytic.score_pair import REFINE_SAMPLES, REFINEMENTS
 from tcs.kernel.arrays import BodyDistances, BoolArray, FloatArray, GridArrays, SceneArrays
 from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.kernel.five_joints.turned import turned_chain

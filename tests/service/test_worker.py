@@ -93,7 +93,7 @@ def test_errors_are_those_of_the_function(worker):
     with pytest.raises(RuntimeError, match="ZeroDivisionError"):
         worker.call(divmod, 1, 0, seconds=60)
     from tcs.service import SelectRequest
-    from tcs.service.sent_content import request_of
+    from tcs.service.sent_documents import request_of
 
     with pytest.raises(DataFileError, match="request is not valid JSON"):
         worker.call(request_of, SelectRequest, b"[", seconds=60)

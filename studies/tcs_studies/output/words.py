@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tcs.output.words.bodies import body_name, frame_name
 from tcs.output.words.numbers import percent
-from tcs.output.words.reasons import REASON_TEXTS
+from tcs.output.words.reasons import REASON_TEXTS, body_name, frame_name
 
 if TYPE_CHECKING:
     from tcs.placement.robustness import Evaluation

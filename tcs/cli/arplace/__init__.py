@@ -5,8 +5,7 @@ from __future__ import annotations
 import typer
 
 from tcs.cli.arplace.drawing import merge, show
-from tcs.cli.arplace.learning import learn
-from tcs.cli.arplace.querying import query
+from tcs.cli.arplace.models import learn, query
 
 app = typer.Typer(
     help="ARPlace: probability of a grasp over base positions, learned for varying parameters.",

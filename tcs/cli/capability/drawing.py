@@ -9,7 +9,7 @@ import typer
 
 from tcs.cli import options
 from tcs.cli.capability.groups import PICTURE, GridOptions, Map, Radius, check_picture
-from tcs.cli.option_groups import expand_options
+from tcs.cli.options import expand_options
 from tcs.output import terminal
 from tcs.output.terminal import capability_tables
 

@@ -16,7 +16,7 @@ from tcs.cli.capability.groups import (
     SampleOptions,
     ScoreOptions,
 )
-from tcs.cli.option_groups import expand_options
+from tcs.cli.options import expand_options
 from tcs.output import terminal
 from tcs.output.terminal import capability_tables
 

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tcs.cli import options
-from tcs.cli.capability.errors import ErrorOptions
-from tcs.cli.capability.groups import PICTURE, TORSO, Map, check_picture
-from tcs.cli.option_groups import expand_options
+from tcs.cli.capability.groups import PICTURE, TORSO, ErrorOptions, Map, check_picture
+from tcs.cli.options import expand_options
 from tcs.files.writing import check_writable
 from tcs.output import terminal
 from tcs.output.terminal import capability_tables

@@ -5,10 +5,8 @@ from __future__ import annotations
 import typer
 
 from tcs.cli.teleop.driving import live
-from tcs.cli.teleop.picking import pick_and_place
-from tcs.cli.teleop.replaying import replay
-from tcs.cli.teleop.trials import experiment
-from tcs.cli.teleop.working import work
+from tcs.cli.teleop.replaying import replay, work
+from tcs.cli.teleop.trials import experiment, pick_and_place
 
 app = typer.Typer()
 app.callback(invoke_without_command=True)(live)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tcs.kernel.analytic.pairs import measure_of, samples_hold_measure
+from tcs.kernel.analytic.score_pair import measure_of, samples_hold_measure
 from tcs.kernel.analytic.scratch import sort_candidates
 from tcs.kernel.approach.curve import path_touches
 from tcs.kernel.approach.follow import close_goal, contact_at, follow

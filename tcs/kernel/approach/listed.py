@@ -18,14 +18,14 @@ from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner
 from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.dexterity.measures import measure_at, rounded_inward
-from tcs.kernel.five_joints.pairs import FiveJointSolver, solve_turned
+from tcs.kernel.five_joints.score_turned import FiveJointSolver, solve_turned
 from tcs.kernel.kinematics import copy_joints, tool_pose
 from tcs.kernel.motion.edges import posture_is_free
 from tcs.kernel.motion.straight import DONE
 from tcs.kernel.motion.tool_line import may_turn
 from tcs.kernel.problem import Problem
 from tcs.kernel.scores import APPROACH_BLOCKED, APPROACH_LIMITS, REACHED
-from tcs.kernel.six_joints.pairs import SixJointSolver, out_of_reach
+from tcs.kernel.six_joints.score_solutions import SixJointSolver, out_of_reach
 
 Listed = TypeVar("Listed", SixJointSolver, FiveJointSolver)
 

@@ -11,11 +11,11 @@ from tcs.kernel.approach.curve import CurveWorkspace, new_curve
 from tcs.kernel.approach.grid import LineGrid, new_grid
 from tcs.kernel.approach.scene import LineScene
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.five_joints.pairs import FiveJointSolver
+from tcs.kernel.five_joints.score_turned import FiveJointSolver
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace, new_motion_workspace
 from tcs.kernel.numeric.search import NumericSolver
 from tcs.kernel.problem import Problem
-from tcs.kernel.six_joints.pairs import SixJointSolver
+from tcs.kernel.six_joints.score_solutions import SixJointSolver
 from tcs.kernel.solvers import new_solver
 from tcs.kernel.workspace import Workspace, new_workspace
 

@@ -14,10 +14,10 @@ from tcs.kernel.analytic.scratch import Search
 from tcs.kernel.approach import listed, pairs, traced
 from tcs.kernel.approach.memory import AnyApproach
 from tcs.kernel.arrays import FloatArray
-from tcs.kernel.five_joints.pairs import FiveJointSolver
+from tcs.kernel.five_joints.score_turned import FiveJointSolver
 from tcs.kernel.numeric.search import NumericSolver
 from tcs.kernel.problem import Problem
-from tcs.kernel.six_joints.pairs import SixJointSolver
+from tcs.kernel.six_joints.score_solutions import SixJointSolver
 from tcs.kernel.solvers import OfSolver
 from tcs.kernel.views import field_class
 

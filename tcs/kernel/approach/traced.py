@@ -18,7 +18,7 @@ from tcs.kernel.cache import inner, int_constant
 from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.motion.straight import DONE
 from tcs.kernel.numeric.curves import correct, point_between, slack_of
-from tcs.kernel.numeric.pairs import EXACT
+from tcs.kernel.numeric.score_curves import EXACT
 from tcs.kernel.numeric.search import (
     SPACING,
     NumericSolver,

@@ -8,11 +8,11 @@ from tcs.kernel.analytic.ik import sample_joints, wrist_goal
 from tcs.kernel.analytic.solver import ArmSolver, is_outside
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import jit
-from tcs.kernel.five_joints.pairs import new_five_joint_solver, solve_turned
+from tcs.kernel.five_joints.score_turned import new_five_joint_solver, solve_turned
 from tcs.kernel.kinematics import pose_error, tool_pose
 from tcs.kernel.numeric.solutions import numeric_solutions
 from tcs.kernel.problem import Problem, chain_of
-from tcs.kernel.six_joints.pairs import new_six_joint_solver
+from tcs.kernel.six_joints.score_solutions import new_six_joint_solver
 from tcs.kernel.six_joints.solutions import solve_six_joints, within_limits
 
 AT_POSE = 1e-7

@@ -24,7 +24,7 @@ from tcs.kernel.kinematics import link_poses
 from tcs.kernel.motion.goal_postures import postures_at
 from tcs.kernel.problem import Problem, gaps_between
 from tcs.kernel.rows import Rows
-from tcs.kernel.six_joints.pairs import new_six_joint_solver
+from tcs.kernel.six_joints.score_solutions import new_six_joint_solver
 from tcs.kernel.six_joints.solutions import MOST_SOLUTIONS, solve_six_joints, within_limits
 from tcs.kernel.views import unowned
 from tcs.kernel.workspace import Workspace, new_workspace

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.kernel.analytic.ik import sample_joints, wrist_goal
-from tcs.kernel.analytic.pairs import measure_of, samples_hold_measure
 from tcs.kernel.analytic.samples import AIM, C2, ELBOW_ROUNDING, MAX_SAMPLES, ROW, WRIST
+from tcs.kernel.analytic.score_pair import measure_of, samples_hold_measure
 from tcs.kernel.analytic.scratch import Search, fill_samples, measure_feasible, new_search, solve
 from tcs.kernel.analytic.solver import ArmSolver, is_outside
 from tcs.kernel.arrays import FloatArray, IntArray

@@ -12,7 +12,7 @@ from tcs.kernel.contacts import NO_CONTACT, gripper_body_contact
 from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.low_discrepancy import spread
 from tcs.kernel.numeric.arm import NumericArm, joint_ranges, numeric_arm_of
-from tcs.kernel.numeric.pairs import NOWHERE, bisect_contacts, choose
+from tcs.kernel.numeric.score_curves import NOWHERE, bisect_contacts, choose
 from tcs.kernel.numeric.search import CurveSearch, find_candidates, new_curve_search, trace_from
 from tcs.kernel.problem import Problem
 from tcs.kernel.rows import Rows

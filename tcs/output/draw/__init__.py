@@ -6,8 +6,7 @@ without a display.
 
 from __future__ import annotations
 
-from tcs.output.draw.encoded import as_png, as_svg
-from tcs.output.draw.figure_files import FORMATS, check_format, save_figure
+from tcs.output.draw.figure_files import FORMATS, as_png, as_svg, check_format, save_figure
 from tcs.output.draw.floor_plan import BaseFootprint
 from tcs.output.draw.goal_marks import GoalMark
 from tcs.output.draw.map import draw_map

@@ -8,9 +8,8 @@ from __future__ import annotations
 from tcs.output.report.blocks import Page, Section
 from tcs.output.report.html import as_html
 from tcs.output.report.markdown import as_markdown
-from tcs.output.report.score.page import make_score_page
+from tcs.output.report.score.page import make_score_page, report_paths, write_score_report
 from tcs.output.report.score.report import CheckSizes, ScoreReport, make_score_report
-from tcs.output.report.score.report_files import report_paths, write_score_report
 
 __all__ = [
     "CheckSizes",

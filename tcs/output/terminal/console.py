@@ -13,7 +13,7 @@ import typer
 from rich.console import Console
 
 from tcs.errors import TcsError
-from tcs.files.json_values import without_infinities
+from tcs.files.plain import without_infinities
 from tcs.interrupts import raise_if_interrupted, remember_interrupts, report_interrupt
 
 _PIPE_WIDTH = 110

@@ -25,7 +25,7 @@ from tcs.output.view.scene_objects import SceneShapes, arrow_path, place
 from tcs.output.view.scene_page import ScenePage
 from tcs.output.view.swept import swept_mesh
 from tcs.output.words import REASON_COLOURS, base_pose_text, goals_text
-from tcs.output.words.motions import not_done_text
+from tcs.output.words.success import not_done_text
 from tcs.placement.scoring.job import whole_task
 from tcs.placement.tables import Reason
 

@@ -10,8 +10,7 @@ from typing import Any
 from tcs.files.writing import whole_file
 from tcs.model.grid import InitialConfiguration
 from tcs.output.report.score.pictures import title_of
-from tcs.output.report.score.scored_scenes import scored_scenes
-from tcs.output.report.score.shown_set import ShownSet
+from tcs.output.report.score.shown_set import ShownSet, scored_scenes
 from tcs.output.view.export import export_page
 from tcs.output.view.live import Viewer, open_meshcat, stay_open
 from tcs.output.view.scene_objects import SceneObjects

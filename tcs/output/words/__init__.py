@@ -13,8 +13,6 @@ from tcs.output.words.answers import (
     gain_text,
     summary_in_words,
 )
-from tcs.output.words.assignment import assign_goals, assigned_goals
-from tcs.output.words.bodies import body_name, frame_name, pair_text
 from tcs.output.words.configurations import (
     HAND,
     axis_name,
@@ -30,6 +28,8 @@ from tcs.output.words.configurations import (
     settings_text,
 )
 from tcs.output.words.goals import (
+    assign_goals,
+    assigned_goals,
     goal_index,
     goal_index_of_number,
     goal_list,
@@ -40,8 +40,15 @@ from tcs.output.words.goals import (
     goals_text,
     text_of_goal,
 )
-from tcs.output.words.measures import REACHABILITY_LABEL, manipulability_label, scores_text
-from tcs.output.words.numbers import p_value, percent, percentage, signed
+from tcs.output.words.numbers import (
+    REACHABILITY_LABEL,
+    manipulability_label,
+    p_value,
+    percent,
+    percentage,
+    scores_text,
+    signed,
+)
 from tcs.output.words.people import person_text
 from tcs.output.words.places import (
     RelativePlace,
@@ -56,7 +63,10 @@ from tcs.output.words.reasons import (
     REASON_COLOURS,
     REASON_NAMES,
     REASON_TEXTS,
+    body_name,
     colour_legend,
+    frame_name,
+    pair_text,
     reason_of,
 )
 

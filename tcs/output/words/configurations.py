@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from tcs.output.words.bodies import frame_name
+from tcs.output.words.reasons import frame_name
 
 HAND = "hand"
 """Key of the names of the hands that serve the goals, in files of several."""

@@ -16,7 +16,6 @@ from tcs.errors import StoreFormatError, TcsError
 from tcs.files.blocks import Blocks
 from tcs.files.compression import compress, decompress
 from tcs.kernel.arrays import FloatArray, IntArray, SceneArrays
-from tcs.kernel.groups import with_group_rows
 from tcs.kernel.problem import (
     TOUCH,
     UNCHECKED,
@@ -26,6 +25,7 @@ from tcs.kernel.problem import (
     with_environment,
 )
 from tcs.kernel.rows import Rows
+from tcs.kernel.shape_groups import with_group_rows
 from tcs.model.people import Scale
 from tcs.model.scene import PeopleInScene, SceneSpec
 from tcs.model.tasks import load_task

@@ -16,13 +16,13 @@ from fastapi.routing import APIRoute
 from tcs.errors import BusyError, DataFileError, TcsError
 from tcs.service.engine import Engine
 from tcs.service.http import description
+from tcs.service.http.description import problem, problem_of
 from tcs.service.http.file_queues import FileQueues
 from tcs.service.http.guard import Access, Guard
-from tcs.service.http.problems import problem, problem_of
 from tcs.service.limits import SMALL_REQUEST
 from tcs.service.operations import OPERATIONS, Operation
 from tcs.service.responses import JobStatus
-from tcs.service.sent_content import request_of
+from tcs.service.sent_documents import request_of
 
 _ABOUT = (
     "Where should an assistive robot stand? Requests have the options of the command line with the "

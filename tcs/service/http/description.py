@@ -1,4 +1,4 @@
-"""The OpenAPI description of the service, and a page that shows it without the internet."""
+"""The OpenAPI description of the service, a page that shows it offline, and its errors."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from collections.abc import Iterator, Mapping
 from html import escape
 from typing import Any
 
+from fastapi import Response
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
-from tcs.service.http.problems import MEDIA_TYPE
+from tcs.errors import BusyError, NotFoundError, TcsError
 from tcs.service.operations import OPERATIONS
 from tcs.service.responses import FileEntry, JobStatus, ProblemDetails
 
@@ -107,3 +108,35 @@ def _form(schema: Mapping[str, Any]) -> str:
     if schema.get("type") == "object":
         return f"mapping of names to {_form(schema.get('additionalProperties', {}))}"
     return str(schema.get("description") or schema.get("type", "any"))
+
+
+MEDIA_TYPE = "application/problem+json"
+REFUSED, ABSENT, BUSY = 422, 404, 503
+_RETRY = {"Retry-After": "1"}
+
+
+def problem(status: int, title: str, detail: str) -> Response:
+    """Return an error.
+
+    Args:
+        status: Status of the response.
+        title: Class of the error.
+        detail: What is wrong and what to do next; line breaks become spaces.
+    """
+    body = ProblemDetails(title=title, status=status, detail=" ".join(detail.splitlines()))
+    return Response(
+        json.dumps(body.model_dump()),
+        status_code=status,
+        media_type=MEDIA_TYPE,
+        headers=_RETRY if status == BUSY else None,
+    )
+
+
+def problem_of(error: TcsError) -> Response:
+    """Return an exception as a response: 404 not held, 503 busy, 422 any other."""
+    status = REFUSED
+    if isinstance(error, NotFoundError):
+        status = ABSENT
+    elif isinstance(error, BusyError):
+        status = BUSY
+    return problem(status, type(error).__name__, str(error))

@@ -10,7 +10,7 @@ from collections.abc import Awaitable, Callable, MutableMapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from tcs.service.http.problems import BUSY, problem
+from tcs.service.http.description import BUSY, problem
 from tcs.service.limits import Limits
 
 Message = MutableMapping[str, Any]

@@ -16,8 +16,13 @@ from tcs.kernel.arrays import FloatArray
 from tcs.teleop.arm import JOINTS, Arm
 from tcs.teleop.control.least_squares import bounded_minimum
 from tcs.teleop.control.settings import Command
-from tcs.teleop.control.state import ControlState, RateCommand, commanded_twist, stop_reason
-from tcs.teleop.control.status import range_fraction
+from tcs.teleop.control.state import (
+    ControlState,
+    RateCommand,
+    commanded_twist,
+    range_fraction,
+    stop_reason,
+)
 
 _ORIENTATION = 0.02
 """Distance that has the weight of a rotation of 1 rad [m]: where both are not possible, the tool

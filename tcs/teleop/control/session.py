@@ -12,12 +12,17 @@ from tcs.kernel.arrays import FloatArray
 from tcs.teleop.arm import JOINTS, Arm
 from tcs.teleop.control.bounds import limit_rate_change, rate_bounds, stops_in_time
 from tcs.teleop.control.joint_groups import holding_rates
-from tcs.teleop.control.modes import rate_command
-from tcs.teleop.control.null_space_modes import elbow_sign
+from tcs.teleop.control.modes import elbow_sign, rate_command
 from tcs.teleop.control.resolved_rate import pose_error, rotated
 from tcs.teleop.control.settings import NULL_SPACE_MODES, Command, Mode, Settings
-from tcs.teleop.control.state import ControlState, RateCommand, commanded_twist, mode_rate_bounds
-from tcs.teleop.control.status import ShortArray, configuration_status
+from tcs.teleop.control.state import (
+    ControlState,
+    RateCommand,
+    ShortArray,
+    commanded_twist,
+    configuration_status,
+    mode_rate_bounds,
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

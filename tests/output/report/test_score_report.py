@@ -17,10 +17,16 @@ from tcs.cli.app import app
 from tcs.model.grid import InitialConfiguration
 from tcs.model.people import load_person
 from tcs.output.report import CheckSizes, as_html, as_markdown, make_score_page, make_score_report
-from tcs.output.report.score.check_tables import success_table, verification_table
-from tcs.output.report.score.goal_tables import goals_table, joints_table, stops_table
-from tcs.output.report.score.grid_tables import pairs_table, reasons_table
 from tcs.output.report.score.reproduce import as_given, robustify_command, score_command
+from tcs.output.report.score.tables import (
+    goals_table,
+    joints_table,
+    pairs_table,
+    reasons_table,
+    stops_table,
+    success_table,
+    verification_table,
+)
 from tcs.output.words import goals_text
 from tcs.placement.scoring import score
 from tcs.placement.store import StateTables, load_scores, save_scores

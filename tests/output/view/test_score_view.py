@@ -7,7 +7,7 @@ import pytest
 import tcs
 from tcs.errors import OutputError
 from tcs.model.grid import InitialConfiguration
-from tcs.output.report.score.scored_scenes import ScoredScene
+from tcs.output.report.score.shown_set import ScoredScene
 from tcs.output.view import (
     ScoreView,
     Viewer,

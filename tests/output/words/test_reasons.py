@@ -28,7 +28,7 @@ def test_a_reason_is_found_by_its_name_in_json(reason):
 
 def test_words_need_no_simulator_compiler_or_plots():
     code = (
-        "import sys, tcs.output.words, tcs.output.words.robustness;"
+        "import sys, tcs.output.words, tcs.output.words.success;"
         "print([m for m in ('matplotlib', 'pydrake', 'numba', 'pandas') if m in sys.modules])"
     )
     assert fresh(code) == "[]"

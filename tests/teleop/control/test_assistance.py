@@ -5,7 +5,7 @@ import pytest
 
 from tcs.teleop import Command, Mode, Teleoperation, load_arm
 from tcs.teleop.control.assistance import isotropy_gradient, posture_rates
-from tcs.teleop.control.status import range_fraction
+from tcs.teleop.control.state import range_fraction
 
 
 def log_isotropy(arm, joints):

@@ -1,18 +1,29 @@
-"""The page of a score report: base poses, scores, reasons, verification and provenance."""
+"""The page of a score report, as HTML, as Markdown or both, and what is on it."""
 
 from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
+from tcs.errors import OutputError
+from tcs.files.writing import check_writable, whole_file
 from tcs.output.report.blocks import Block, Code, Collapsible, Facts, Page, Picture, Section, Text
+from tcs.output.report.html import as_html
 from tcs.output.report.machine import machine, today, versions
-from tcs.output.report.score.check_tables import success_table, verification_table
-from tcs.output.report.score.goal_tables import goals_table, joints_table
-from tcs.output.report.score.grid_tables import pairs_table, reasons_table
+from tcs.output.report.markdown import as_markdown
 from tcs.output.report.score.report import ScoreReport
 from tcs.output.report.score.reproduce import commands, success_record
 from tcs.output.report.score.summary import summary_blocks, unreached_everywhere
+from tcs.output.report.score.tables import (
+    goals_table,
+    joints_table,
+    pairs_table,
+    reasons_table,
+    success_table,
+    verification_table,
+)
 from tcs.output.report.score.tours import tours_blocks
 from tcs.output.words import (
     assigned_goals,
@@ -22,7 +33,7 @@ from tcs.output.words import (
     member_text,
     scores_text,
 )
-from tcs.output.words.robustness import BODY_COLLISIONS, error_width
+from tcs.output.words.success import BODY_COLLISIONS, error_width
 from tcs.placement.refinement import refinement_summary
 from tcs.placement.store import APPROACH
 from tcs.placement.tables import SetTable
@@ -232,3 +243,51 @@ def _sets(sets: SetTable) -> str:
 def _configurations(report: ScoreReport) -> str:
     size, tables = report.job.grid.size, len(report.file.tables)
     return f"{size:,}" if tables == 1 else f"{size:,} in each of {tables} state tables"
+
+
+_FORMATS = {".html": as_html, ".md": as_markdown}
+
+
+def report_paths(out: Path, *, markdown: bool = False) -> tuple[Path, ...]:
+    """Return the files of a report, after a check that each can be written.
+
+    Args:
+        out: The page; its ending, .html or .md, decides the format.
+        markdown: Whether to write the page as Markdown, too, under the same name.
+
+    Raises:
+        OutputError: If the ending is another one, or a file cannot be written.
+    """
+    if out.suffix.lower() not in _FORMATS:
+        raise OutputError(f"Report '{out}': its name must end in one of {', '.join(_FORMATS)}.")
+    beside = out.with_suffix(".md")
+    paths = (out, beside) if markdown and beside != out else (out,)
+    for path in paths:
+        check_writable(path)
+    return paths
+
+
+def write_score_report(
+    report: ScoreReport, paths: Sequence[Path], *, command: str
+) -> dict[str, Any]:
+    """Write the page of a report, and return a summary of both as plain containers.
+
+    Args:
+        report: The report.
+        paths: Files to write, from `report_paths`.
+        command: Command that makes the page; the page shows it.
+
+    Raises:
+        OutputError: If a file cannot be written.
+    """
+    page = make_score_page(report, command=command)
+    sizes = [_write_page(path, page) for path in paths]
+    return {"files": [str(path) for path in paths], "bytes": sizes, **report.to_json()}
+
+
+def _write_page(path: Path, page: Page) -> int:
+    """Write a page in the format of its ending, and return its size in bytes."""
+    content = _FORMATS[path.suffix.lower()](page).encode()
+    with whole_file(path, "Report") as stream:
+        stream.write(content)
+    return len(content)

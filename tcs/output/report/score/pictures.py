@@ -31,8 +31,7 @@ from tcs.output.report.score.scene_solids import (
     goal_solids,
     robot_solids,
 )
-from tcs.output.report.score.scored_scenes import ScoredScene, scored_scenes
-from tcs.output.report.score.shown_set import ShownSet
+from tcs.output.report.score.shown_set import ScoredScene, ShownSet, scored_scenes
 from tcs.output.words import (
     assign_goals,
     assigned_goals,

@@ -14,8 +14,7 @@ from tcs.model.grid import InitialConfiguration
 from tcs.motion import plan
 from tcs.output.draw import as_png
 from tcs.output.report.score.pictures import map_figure, member_figure
-from tcs.output.report.score.scored_scenes import ScoredScene, scored_scenes
-from tcs.output.report.score.shown_set import ShownSet
+from tcs.output.report.score.shown_set import ScoredScene, ShownSet, scored_scenes
 from tcs.output.report.score.states import has_states, states_figure
 from tcs.output.report.score.tours import Tours
 from tcs.output.words import assign_goals

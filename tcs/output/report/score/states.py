@@ -17,8 +17,7 @@ from tcs.output.report.score.pictures import (
     title_of,
 )
 from tcs.output.report.score.scene_solids import base_outline, environment_solids
-from tcs.output.report.score.scored_scenes import ScoredScene, scored_scenes
-from tcs.output.report.score.shown_set import ShownSet
+from tcs.output.report.score.shown_set import ScoredScene, ShownSet, scored_scenes
 from tcs.output.words import axis_name, quantity
 from tcs.placement.store import ScoreFile
 

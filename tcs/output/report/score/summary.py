@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from tcs.output.report.blocks import Block, Bullets
-from tcs.output.report.score.goal_tables import stops_table
 from tcs.output.report.score.report import ScoreReport
+from tcs.output.report.score.tables import stops_table
 from tcs.output.words import (
     REASON_TEXTS,
     base_pose_text,

@@ -14,7 +14,7 @@ from tcs.model.scene.contacts import Group
 from tcs.motion import MotionPlan, Segment, StopPlan
 from tcs.output.report.blocks import Block, Bullets, Cell, Column, Table, Text
 from tcs.output.words import frame_name, pair_text
-from tcs.output.words.motions import not_done_text, place_text
+from tcs.output.words.success import not_done_text, place_text
 
 FARTHEST = 0.10
 """Distance beyond which clearances are not measured [m]."""

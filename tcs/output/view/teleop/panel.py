@@ -19,7 +19,7 @@ from pydrake.math import RigidTransform
 
 from tcs.output.view.teleop.text import ADVANCE, text_mesh
 from tcs.teleop import Arm
-from tcs.teleop.control.status import ShortArray, range_fraction
+from tcs.teleop.control.state import ShortArray, range_fraction
 
 FloatArray = NDArray[np.float64]
 PANEL = "/Cameras/default/rotated/<object>/panel"

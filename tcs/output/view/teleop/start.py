@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tcs.output.view.teleop.robot_display import RobotDisplay
 from tcs.teleop import Arm, Settings
 from tcs.teleop.control.resolved_rate import smallest_singular_value
-from tcs.teleop.control.status import range_fraction
+from tcs.teleop.control.state import range_fraction
 
 FloatArray = NDArray[np.float64]
 _CANDIDATES, _TRIED, _CLIMB = 3000, 20, 500

@@ -1,9 +1,66 @@
-"""Words for the parts of a population."""
+"""Words for what is done: under error, with motions, and for the people of a population."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
+
+from tcs.output.words.reasons import pair_text
+
+BODY_COLLISIONS = {
+    "paper": "of the robot's body count, except those of the base with the furniture",
+    "all": "of the robot's body count",
+    "none": "of the robot's body are ignored",
+}
+"""What the collisions of base, torso, head and other arm mean for a sample."""
+
+
+def error_width(error: Mapping[str, Any]) -> str:
+    """Return the width of the distribution of an error.
+
+    >>> error_width({"distribution": "normal", "std": 0.05})
+    'standard deviation 0.05 m'
+    >>> error_width({"distribution": "uniform", "half_width_deg": 5.0})
+    'uniform ±5 deg'
+    """
+    (key, width) = next((k, v) for k, v in error.items() if k != "distribution")
+    unit = "deg" if key.endswith("_deg") else "m"
+    sign = "standard deviation " if error["distribution"] == "normal" else "uniform ±"
+    return f"{sign}{width:g} {unit}"
+
+
+NOT_DONE_TEXTS = {
+    "unreached": "no posture reaches it",
+    "rest_blocked": "something touches the robot while its arm rests",
+    "approach_limits": "joint or velocity limits prevent its approach",
+    "approach_blocked": "its approach is blocked",
+    "no_path": "no path was found",
+}
+"""Why a goal is not done, by the reason in plans and motion files."""
+
+
+def place_text(place: str | int) -> str:
+    """Return the begin or end of a segment, as plans have it in JSON.
+
+    >>> place_text("rest"), place_text(3)
+    ('rest', 'goal 4')
+    """
+    return place if isinstance(place, str) else f"goal {place + 1}"
+
+
+def not_done_text(goal: Mapping[str, Any]) -> str:
+    """Return why a goal is not done, as one line.
+
+    Args:
+        goal: The result of a goal that is not done, as plans have it in JSON.
+    """
+    text = f"goal {goal['goal'] + 1}: {NOT_DONE_TEXTS[goal['reason']]}"
+    if goal["segment"]:
+        text += f" ({goal['segment']}, tried for {goal['seconds']:.2f} s)"
+    if goal["pair"] is not None:
+        text += f"; most often {pair_text(goal['pair'])}"
+    return text
+
 
 MEASURES: Mapping[str, str] = {
     "abdominalextensiondepthsitting": "abdominal depth, seated",

@@ -1,8 +1,9 @@
-"""The command `tcs arplace query`: the best base position for an object."""
+"""The commands `tcs arplace learn` and `query`: make a model, and ask for a base position."""
 
 from __future__ import annotations
 
 import math
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,14 +11,45 @@ import typer
 
 from tcs.cli import options
 from tcs.cli.arplace.drawing import PICTURE, check_outputs, draw_map
-from tcs.cli.arplace.groups import PoseOptions
-from tcs.cli.option_groups import expand_options
+from tcs.cli.arplace.groups import GeneralisationOptions, PoseOptions, TaskOptions
+from tcs.cli.options import expand_options
 from tcs.errors import SelectionError
+from tcs.files.writing import check_writable
 from tcs.output import terminal
 from tcs.output.terminal import arplace_tables
 
 if TYPE_CHECKING:
     from tcs.capability.arplace import FloorObstacle
+
+
+@expand_options
+def learn(
+    out: Annotated[Path, typer.Option(help="Model to write.")],
+    task: TaskOptions,
+    generalisation: GeneralisationOptions,
+    robot: options.Robot = "tiago",
+    jobs: options.Jobs = 2,
+    as_json: options.Json = False,
+) -> None:
+    """Learn from which base positions grasps on a table are reached.
+
+    The kernel labels every base position for every grasp; contacts with the table count. The
+    defaults are the task of Appendix D of the ITCM thesis.
+    """
+    from tcs.capability.arplace import learn as learn_arplace
+    from tcs.capability.arplace import save_arplace
+
+    check_writable(out)
+    begun = time.perf_counter()
+    with terminal.progress_bar("labels") as on_progress:
+        arplace = learn_arplace(
+            robot, task.task(), generalisation.options(), jobs=jobs, on_progress=on_progress
+        )
+    seconds = time.perf_counter() - begun
+    save_arplace(out, arplace)
+    result = {**arplace_tables.model_result(out, arplace), "seconds": round(seconds, 3)}
+    terminal.print_result(result, arplace_tables.report_learned, as_json=as_json)
+
 
 Model = Annotated[Path, typer.Argument(metavar="FILE", help="A model made by `tcs arplace learn`.")]
 

@@ -33,7 +33,7 @@ EXACT = 1e-9
 FIRST_TRIES = 6
 """Number of candidates checked in the order of their measure before all are checked in sequence."""
 REFINEMENTS, REFINE_SAMPLES = 3, 8
-"""As in `tcs.kernel.analytic.pairs`."""
+"""As in `tcs.kernel.analytic.score_pair`."""
 BISECTIONS = 8
 """Bisections of the interval between two contacts, down to SPACING / 256."""
 APPROXIMATE, SOLVED = int_constant(0), int_constant(1)
@@ -197,8 +197,8 @@ def bisect_contacts(
 ) -> float:
     """Search for a collision-free position between candidates that are all in contact.
 
-    As in `analytic.pairs.bisect_contacts`, where the pair in contact changes from one candidate to
-    the next, bisection searches between the two positions.
+    As in `analytic.score_pair.bisect_contacts`, where the pair in contact changes from one
+    candidate to the next, bisection searches between the two positions.
 
     Returns:
         The position or NOWHERE.
