@@ -21,7 +21,7 @@ from tcs.kernel.analytic.scratch import (
     solve,
     sort_candidates,
 )
-from tcs.kernel.analytic.search import find_candidates, record_all
+from tcs.kernel.analytic.search import find_candidates, find_coarse, record_all
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, int_constant
 from tcs.kernel.contacts import NO_CONTACT, arm_contact, at_goal
@@ -38,8 +38,8 @@ REFINEMENTS, MORE_REFINEMENTS = int_constant(3), int_constant(8)
 contacts the best solution lies next to one of them, and where joints move fast they move far from
 one sample to the next: both take more."""
 REFINE_SAMPLES = int_constant(8)
-QUICK_TRIES = int_constant(48)
-"""Candidates of a pose that a quick look checks for contacts, evenly among all."""
+QUICK_TRIES = int_constant(16)
+"""Most candidates of a pose that a quick look checks for contacts, evenly among all."""
 WORTH = 1.00001
 """By what factor a solution found later must be better to replace one: isotropy counts to the sixth
 power here, and rounding joints to float32 costs up to 1e-7."""
@@ -275,11 +275,14 @@ def quick_look(
     Returns:
         Reason and contact code.
     """
-    found = find_candidates(problem.arm, search, search.feasible.arc_count[0])
+    if least >= 0.0:
+        found = find_candidates(problem.arm, search, search.feasible.arc_count[0])
+        if not found:
+            return JOINT_LIMITS, NO_CONTACT
+        return _best_above(problem, work, body_A, search, found, least)
+    found = find_coarse(problem.arm, search, search.feasible.arc_count[0])
     if not found:
         return JOINT_LIMITS, NO_CONTACT
-    if least >= 0.0:
-        return _best_above(problem, work, body_A, search, found, least)
     contact = NO_CONTACT
     for n in range(0, found, 1 + found // QUICK_TRIES):
         branch = problem.arm.branches[search.candidates.branch[n]]

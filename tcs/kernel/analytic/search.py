@@ -26,6 +26,9 @@ MIN_SAMPLES = int_constant(8)
 """Least number of samples of a window or arc: one SIMD vector."""
 FINE_SAMPLES = int_constant(8)
 """Number of samples at each end of a feasible interval, and about a peak that is refined."""
+COARSE_SAMPLES, ENOUGH = int_constant(16), int_constant(10)
+"""Number of samples of a window in which any feasible angle will do, and of feasible ones in the
+first pass over an arc that do without."""
 PEAK_REFINEMENTS = 4
 """Number of refinements about an infeasible peak, each to 2/7 of the spacing: down to 8e-5
 rad. A window between a limit that one joint leaves and a limit that another meets may be
@@ -59,6 +62,48 @@ def find_candidates(arm: ArmSolver, search: Search, arcs: int) -> int:
                 start = feasible.arcs[k, 0] + feasible.windows[w, 0] * step
                 stop = feasible.arcs[k, 0] + feasible.windows[w, 1] * step
                 found = _refine_window(arm, search, b, start, stop, found)
+    return found
+
+
+@jit
+def find_coarse(arm: ArmSolver, search: Search, arcs: int) -> int:
+    """Collect feasible angles as `find_candidates`, fewer of each window.
+
+    Their measures are not computed, and what lies between them is not recorded.
+
+    Args:
+        arm: The arm.
+        search: `goal` and `feasible.arcs` are read; the candidates are filled.
+        arcs: Number of arcs.
+
+    Returns:
+        Number of candidates.
+    """
+    feasible = search.feasible
+    search.postponed.number[0] = 0
+    length = _length(search, arcs)
+    found = NONE
+    for k in range(arcs):
+        for b in range(len(arm.branches)):
+            count, step = _sample_arc(arm, search, b, k, length)
+            before = found
+            for i in range(count):
+                if search.samples.slack[i] >= 0.0:
+                    found = add_candidate(search, b, i, step, found)
+            if found - before >= ENOUGH:
+                continue
+            found = before
+            windows = windows_of(search.samples.slack, count, step, feasible.windows, 0)
+            for w in range(windows):
+                first = feasible.arcs[k, 0] + feasible.windows[w, 0] * step
+                last = feasible.arcs[k, 0] + feasible.windows[w, 1] * step
+                before, fine = found, fill_samples(search, first, last, COARSE_SAMPLES)
+                solve(arm, search, b, COARSE_SAMPLES)
+                for i in range(COARSE_SAMPLES):
+                    if search.samples.slack[i] >= 0.0:
+                        found = add_candidate(search, b, i, fine, found)
+                if found == before:
+                    found = _refine_window(arm, search, b, first, last, found)
     return found
 
 

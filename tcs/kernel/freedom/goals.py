@@ -27,7 +27,7 @@ from tcs.kernel.freedom.forms import (
     spacing,
     wrist_positions,
 )
-from tcs.kernel.freedom.reach import WristReach, wrist_reach
+from tcs.kernel.freedom.reach import WristReach, no_reach, wrist_reach
 
 ON_AXIS = 1e-9
 """Greatest distance of the tool from the axis of the last joint [m], and sine of the angle between
@@ -112,7 +112,7 @@ def no_freedom() -> FreeGoals:
         wrist=np.empty((0, 3)),
         is_tried=np.empty(0, np.bool_),
         around=np.empty((0, 4)),
-        reach=WristReach(np.zeros(3), np.zeros(3), np.inf, np.empty((0, 4))),
+        reach=no_reach(),
     )
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from tcs.kernel.arrays import Chain, FloatArray
 from tcs.kernel.freedom.forms import FEWEST_JOINTS
+from tcs.kernel.freedom.wrist_places import WristPlaces, no_places, wrist_places
 
 ROUNDS = 200
 """Steps towards the shortest chain."""
@@ -37,6 +38,13 @@ class WristReach(NamedTuple):
     slabs: FloatArray
     """Unit vectors in A, and the greatest distance of the wrist from the pivot along each, in both
     directions [m], shape (n, 4): one for each prismatic joint before the revolute ones."""
+    places: WristPlaces
+    """Where joints within their limits take it, known for some arms with a spherical wrist."""
+
+
+def no_reach() -> WristReach:
+    """Return what bounds nothing."""
+    return WristReach(np.zeros(3), np.zeros(3), np.inf, np.empty((0, 4)), no_places())
 
 
 def wrist_reach(chain: Chain) -> WristReach:
@@ -86,6 +94,7 @@ def wrist_reach(chain: Chain) -> WristReach:
         wrist=wrist,
         span=inside + travel,
         slabs=_slabs(axes, inside + _travel(chain, slice(first, 7)), chain, before),
+        places=wrist_places(chain, wrist),
     )
 
 

@@ -24,6 +24,7 @@ from tcs.kernel.freedom.forms import (
     pose_of,
 )
 from tcs.kernel.freedom.goals import FreeGoals
+from tcs.kernel.freedom.wrist_places import is_no_place
 from tcs.kernel.kinematics import copy_joints
 from tcs.kernel.problem import Problem
 from tcs.kernel.scores import (
@@ -43,6 +44,8 @@ SCALES = np.array([0.4, 0.2, 0.1])
 range of each parameter."""
 PROMISING = int(NEARNESS[GRIPPER_BLOCKED_BY_ROBOT])
 """Nearness of a sample from which further poses next to it are tried."""
+BEYOND_LIMITS = int(NEARNESS[JOINT_LIMITS])
+"""Nearness of a pose that no posture within the limits reaches, or more than that."""
 CLOSE, PART = int(NEARNESS[ARM_BLOCKED]), 3
 """Nearness from which all of the poses next to a sample of any orientation are tried; next to
 others, one in PART is."""
@@ -59,6 +62,8 @@ ANY = -1.0
 """Bound of a measure that every solution exceeds."""
 UNKNOWN = -2
 """In place of a contact code of the gripper: not looked for yet."""
+SLABS = 4
+"""Row of the first slab in the bounds of the reach."""
 NO_SAMPLE = -1
 """In place of the number of a sample: a tool pose between them."""
 
@@ -222,24 +227,41 @@ def _try_samples(
             if came > farthest:
                 farthest, reason, contact = came, why, code
             continue
+        lost = _is_lost(problem, bounds, free.wrist[start + n])
+        if lost:
+            # Poses next to it may be within the limits; its reason counts where none is nearer.
+            worth[n] = SOME if any_orientation else ALL
+            if farthest >= BEYOND_LIMITS:
+                continue
         u = free.u[start + n]
         near = top >= 0 and not any_orientation and (u[1] != 0.0 or u[2] != 0.0)
         if near:
             copy_joints(best, solver.best)
-        why, code = _score_at(problem, work, solver, grippers, goal, n, u, least, near)
+        # Next to a tilted or displaced pose there are others: a quick look is enough there.
+        bound = ANY if least < ANY and _is_moved(u) else least
+        why, code = _score_at(problem, work, solver, grippers, goal, n, u, bound, near)
         if why == REACHED:
             measure = measure_at(problem, solver.best)
             if measure > value:
                 value, top, least = measure, n, NEAR * measure
                 copy_joints(solver.best, best)
         came = NEARNESS[why]
-        if came < PROMISING and why != GRIPPER_BLOCKED_BY_ENVIRONMENT:
+        if not lost and came < PROMISING and why != GRIPPER_BLOCKED_BY_ENVIRONMENT:
             worth[n] = NONE
-        elif PROMISING <= came < CLOSE and any_orientation:
+        elif not lost and PROMISING <= came < CLOSE and any_orientation:
             worth[n] = SOME
         if came > farthest:
             farthest, reason, contact = came, why, code
     return top, reason, contact
+
+
+@inner
+def _is_moved(u: FloatArray) -> bool:
+    """Return whether a tool pose is tilted or displaced."""
+    for k in range(1, PARAMETERS):
+        if u[k] != 0.0:
+            return True
+    return False
 
 
 @inner
@@ -281,6 +303,8 @@ def _try_next_to(
         for child in range(first, last):
             k = free.children[child]
             if _reach_of(bounds, free.wrist[start + k], 0.0) != REACHED:
+                continue
+            if farthest >= BEYOND_LIMITS and _is_lost(problem, bounds, free.wrist[start + k]):
                 continue
             nearest = free.parents[start + k, 0]
             if nearest != n and worth[nearest] >= worth[n]:
@@ -555,26 +579,48 @@ def clip(form: FloatArray, u: FloatArray) -> None:
 
 @inner
 def _reach_in_goal(problem: Problem, work: Workspace, goal: PlacedGoal) -> FloatArray:
-    """Return the bound of the arm's reach in the frame of the goal, shape (1 + slabs, 4).
+    """Return the bounds of the arm's reach in the frame of the goal, shape (SLABS + slabs, 4).
 
-    The first row is the pivot and the greatest distance from it; the others are the slabs.
+    The first row is the pivot and the greatest distance from it. The next ones take a point to the
+    frame of joint 1: their product with it, and what is added to that. The others are the slabs.
     """
     R_WG, p_WG = problem.goals.R[goal.state, goal.goal], problem.goals.p[goal.state, goal.goal]
     pose_in_arm_base(problem, work, goal.torso, R_WG, p_WG)
     R, p, reach = work.R_AG, work.p_AG, problem.goals.freedom.reach
-    found = np.empty((1 + len(reach.slabs), 4))
+    found, R_A1, p_A1 = np.empty((SLABS + len(reach.slabs), 4)), reach.places.R, reach.places.p
     for k in range(3):
         found[0, k] = 0.0
         for r in range(3):
             found[0, k] += R[r, k] * (reach.pivot[r] - p[r])
     found[0, 3] = reach.span
+    for n in range(3):
+        found[1 + n, 3] = 0.0
+        for r in range(3):
+            found[1 + n, 3] += R_A1[r, n] * (p[r] - p_A1[r])
+        for k in range(3):
+            found[1 + n, k] = R_A1[0, n] * R[0, k] + R_A1[1, n] * R[1, k] + R_A1[2, n] * R[2, k]
     for n in range(len(reach.slabs)):
         for k in range(3):
-            found[1 + n, k] = 0.0
+            found[SLABS + n, k] = 0.0
             for r in range(3):
-                found[1 + n, k] += R[r, k] * reach.slabs[n, r]
-        found[1 + n, 3] = reach.slabs[n, 3]
+                found[SLABS + n, k] += R[r, k] * reach.slabs[n, r]
+        found[SLABS + n, 3] = reach.slabs[n, 3]
     return found
+
+
+@inner
+def _is_lost(problem: Problem, reach: FloatArray, at: FloatArray) -> bool:
+    """Return whether no posture within the joint limits takes the wrist to a position.
+
+    Args:
+        problem: The scene.
+        reach: From `_reach_in_goal`.
+        at: Position of the wrist in the frame of the goal [m], shape (3,).
+    """
+    x = reach[1, 0] * at[0] + reach[1, 1] * at[1] + reach[1, 2] * at[2] + reach[1, 3]
+    y = reach[2, 0] * at[0] + reach[2, 1] * at[1] + reach[2, 2] * at[2] + reach[2, 3]
+    z = reach[3, 0] * at[0] + reach[3, 1] * at[1] + reach[3, 2] * at[2] + reach[3, 3]
+    return is_no_place(problem.goals.freedom.reach.places, x, y, z)
 
 
 @inner
@@ -590,7 +636,7 @@ def _reach_of(reach: FloatArray, at: FloatArray, radius: float) -> int:
     span = reach[0, 3] + radius
     if x * x + y * y + z * z > span * span:
         return TOO_FAR
-    for n in range(1, len(reach)):
+    for n in range(SLABS, len(reach)):
         along = reach[n, 0] * x + reach[n, 1] * y + reach[n, 2] * z
         if abs(along) > reach[n, 3] + radius:
             return JOINT_LIMITS
