@@ -403,7 +403,10 @@ def _judged(stop: Stop, neighbours: NeighbourList, arm: Arm, path: FloatArray) -
             is_true &= _onto(arm, q, (level + share) / levels, work)
             fine.append(q)
     q = np.array(fine)
-    speed = np.abs(np.diff(q, axis=0)) * (levels * parts) / arm.fastest
+    rates = np.diff(q, axis=0) * (levels * parts)
+    # A joint next to a singularity is faster at the end itself than on average to the next posture.
+    ends = 1.5 * rates[[0, -1]] - 0.5 * rates[[1, -2]]
+    speed = np.abs(np.concatenate([rates, ends])) / arm.fastest
     limited = np.isfinite(arm.lower)
     slack = np.minimum(q - arm.lower, arm.upper - q)[:, limited].min()
     is_true &= bool(speed.max() <= 1.0 and slack >= -1e-9)

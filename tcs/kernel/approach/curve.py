@@ -53,6 +53,8 @@ class CurveWorkspace(NamedTuple):
     allow."""
     slopes: FloatArray
     """These derivatives as they are, shape (n, 7)."""
+    ahead: FloatArray
+    """Scratch: where joints move at their rates from one point to the next [rad], shape (7,)."""
     line: StraightWorkspace
     """The line, and kinematics at one posture."""
     goal: FloatArray
@@ -77,6 +79,7 @@ def new_curve() -> CurveWorkspace:
         np.empty((MOST + 1, 7)),
         np.empty((MOST + 1, 7)),
         np.empty((MOST + 1, 7)),
+        np.empty(7),
         new_straight_workspace(),
         np.empty((4, 3)),
         np.zeros(2, np.int64),

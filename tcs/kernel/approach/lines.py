@@ -13,17 +13,20 @@ from tcs.kernel.approach.curve import MOST, finish_spline, is_too_fast, spline_i
 from tcs.kernel.approach.grid import NOWHERE, PIECES
 from tcs.kernel.approach.memory import AnyApproach, Approach
 from tcs.kernel.approach.opening import end_of_window
+from tcs.kernel.approach.rates import are_kept, slow_down
 from tcs.kernel.approach.scene import pair_contact_code
 from tcs.kernel.approach.turns import place_sample
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, int_constant
 from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.dexterity.measures import rounded_inward
+from tcs.kernel.motion.scene import MotionScene
 from tcs.kernel.motion.straight import (
     BLOCKED,
     DONE,
     LIMITS,
     OFF_LINE,
+    StraightWorkspace,
     next_on_line,
     release_joints,
     tangent_on_line,
@@ -34,6 +37,13 @@ AT_GOAL = int_constant(0)
 """Number of the point of a spline at the goal."""
 PER_LEVEL = MOST // PIECES
 """Number of pieces of the spline between two levels of the grid."""
+NONE = -1
+"""In place of a joint that rests."""
+RESTS = 1e-6
+"""Distance from a limit within which a joint may rest where it is, all along a line [rad]."""
+NARROW = 16
+"""Greatest number of columns of a window in which the grid may miss lines: further on they may be
+closer together than the columns."""
 APART = 8
 """Number of columns from one posture to the next of a window, from which lines are followed."""
 
@@ -52,25 +62,53 @@ def lead_from(
         first: Number of the point of the spline at which the posture is.
         q: The posture [rad], shape (7,).
     """
-    curve, scene, offset = approach.curve, approach.scene, approach.offset
-    points, slopes, line = curve.points, curve.slopes, curve.line
+    scene, line = approach.scene, approach.curve.line
+    outcome = _lead(problem, approach, fastest, first, q, NONE)
     release_joints(scene, line)
-    if not next_on_line(scene, line, offset, first / MOST, q, points[first]):
+    for k in range(7):
+        if outcome == DONE:
+            break
+        slack = min(q[k] - scene.lower[k], scene.upper[k] - q[k])
+        if line.locked[k] == 0 and slack < RESTS:
+            rested = _lead(problem, approach, fastest, first, q, k)
+            if rested != LIMITS:
+                outcome = rested
+    return outcome
+
+
+@inner
+def _lead(
+    problem: Problem,
+    approach: AnyApproach,
+    fastest: FloatArray,
+    first: int,
+    q: FloatArray,
+    resting: int,
+) -> int:
+    """Do as `lead_from` with a joint that rests all along, or NONE."""
+    curve, scene, offset = approach.curve, approach.scene, approach.offset
+    points, slopes, line, ahead = curve.points, curve.slopes, curve.line, curve.ahead
+    _release(scene, line, resting)
+    if not next_on_line(scene, line, offset, first / MOST, q, q, points[first]):
         return LIMITS
     for side in range(2):
         step = 1 - 2 * side
-        release_joints(scene, line)
+        _release(scene, line, resting)
         n = first
         while True:
             if not tangent_on_line(scene, line, offset, points[n], slopes[n]):
                 return LIMITS
-            for k in range(7):
-                if abs(slopes[n, k]) > fastest[k]:
+            before, begin = n, points[n]
+            if not are_kept(fastest, slopes[n]):
+                if not slow_down(line, fastest, slopes[n]):
                     return LIMITS
+                begin = ahead
+                for k in range(7):
+                    begin[k] = points[n, k] + step / MOST * slopes[n, k]
             if n == (0 if side else MOST):
                 break
             n += step
-            if not next_on_line(scene, line, offset, n / MOST, points[n - step], points[n]):
+            if not next_on_line(scene, line, offset, n / MOST, points[before], begin, points[n]):
                 return LIMITS
             if is_too_fast(points, n + side, MOST, fastest):
                 return LIMITS
@@ -85,6 +123,14 @@ def lead_from(
 
 
 @inner
+def _release(scene: MotionScene, line: StraightWorkspace, resting: int) -> None:
+    """Let all joints move but one, or but NONE."""
+    release_joints(scene, line)
+    if resting != NONE:
+        line.locked[resting] = 1
+
+
+@inner
 def lead_through_windows(
     problem: Problem, approach: Approach, fastest: FloatArray, b: int, level: int
 ) -> bool:
@@ -93,22 +139,52 @@ def lead_through_windows(
     Returns:
         Whether one is free; `search.best` is filled then, with the posture at the goal.
     """
-    grid = approach.grid
-    low, high = _next_window(approach, b, level, grid.spans[b, level, 0])
+    low, high = _next_window(approach, b, level, approach.grid.spans[b, level, 0])
     while low != NOWHERE:
-        width = high + 1 - low
-        count = (width + APART - 1) // APART
-        for n in range(count):
-            column = low + (2 * n + 1) * width // (2 * count)
-            angle = grid.origin[0] + column * grid.origin[1]
-            if _lead_through(problem, approach, fastest, b, angle, level):
-                return True
+        if _lead_through_window(problem, approach, fastest, b, level, low, high):
+            return True
         # What is free of contact may be next to a limit alone, closer than the columns are.
         for side in range(2):
             angle = end_of_window(problem, approach, b, level, high if side else low, side == 1)
             if _lead_through(problem, approach, fastest, b, angle, level):
                 return True
         low, high = _next_window(approach, b, level, high + 1)
+    return False
+
+
+@inner
+def lead_through_narrow(
+    problem: Problem, approach: Approach, fastest: FloatArray, b: int, level: int
+) -> bool:
+    """Do as `lead_through_windows` for windows of at most NARROW columns, without their ends."""
+    low, high = _next_window(approach, b, level, approach.grid.spans[b, level, 0])
+    while low != NOWHERE:
+        if high - low < NARROW and _lead_through_window(
+            problem, approach, fastest, b, level, low, high
+        ):
+            return True
+        low, high = _next_window(approach, b, level, high + 1)
+    return False
+
+
+@inner
+def _lead_through_window(
+    problem: Problem,
+    approach: Approach,
+    fastest: FloatArray,
+    b: int,
+    level: int,
+    low: int,
+    high: int,
+) -> bool:
+    """Do as `lead_through_windows` for one window, from column `low` to column `high`."""
+    grid, width = approach.grid, high + 1 - low
+    count = (width + APART - 1) // APART
+    for n in range(count):
+        column = low + (2 * n + 1) * width // (2 * count)
+        angle = grid.origin[0] + column * grid.origin[1]
+        if _lead_through(problem, approach, fastest, b, angle, level):
+            return True
     return False
 
 

@@ -21,14 +21,16 @@ from tcs.kernel.approach.grid import (
 )
 from tcs.kernel.approach.lines import (
     AT_GOAL,
+    NARROW,
     lead_from,
+    lead_through_narrow,
     lead_through_windows,
     narrowest_level,
 )
 from tcs.kernel.approach.memory import ENOUGH, Approach
 from tcs.kernel.approach.opening import make_whole, open_begin, open_branch, open_goal
 from tcs.kernel.arrays import FloatArray
-from tcs.kernel.cache import inner
+from tcs.kernel.cache import inner, int_constant
 from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.dexterity.measures import rounded_inward
 from tcs.kernel.kinematics import copy_joints
@@ -41,9 +43,6 @@ PATH_SPEED = 0.8
 through the levels are faster in between."""
 NEAR = 8
 """Number of columns on either side of the posture that scoring found, whose line is tried first."""
-NARROW = 16
-"""Greatest number of columns of a window that is searched again if no line leads beyond it: further
-on it may be narrower than their spacing."""
 FINE, TIMES = 8, 2
 """Factor by which the columns are closer then, and how often."""
 STEEPEST = 40.0
@@ -51,6 +50,8 @@ STEEPEST = 40.0
 that may be hidden between columns: four times what scoring allows for."""
 EXPECTED = -2
 """In place of a contact: postures are checked before their line is followed."""
+GOAL = int_constant(0)
+"""Level of the goal."""
 SHIFTS = 4
 """Number of times that the columns are moved by a part of their spacing, until a line is free."""
 
@@ -244,6 +245,9 @@ def _search_lines(problem: Problem, approach: Approach, fastest: FloatArray, q: 
             continue
         in_doubt = True
         if lead_through_windows(problem, approach, fastest, b, narrowest_level(approach, b)):
+            return True
+        open_goal(problem, approach, b, 0, columns[0] - 1)
+        if lead_through_narrow(problem, approach, fastest, b, GOAL):
             return True
     for b in range(len(arm.branches) if in_doubt else 0):
         if open_begin(problem, approach, b) and lead_through_windows(

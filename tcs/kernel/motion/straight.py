@@ -185,7 +185,9 @@ def _lead(
     for k in range(7):
         points[0, k] = q[k]
     for n in range(last + 1):
-        if n > 0 and not next_on_line(scene, line, offset, n / last, points[n - 1], points[n]):
+        if n > 0 and not next_on_line(
+            scene, line, offset, n / last, points[n - 1], points[n - 1], points[n]
+        ):
             return LIMITS
         if not tangent_on_line(scene, line, offset, points[n], tangents[n]):
             return LIMITS
@@ -321,11 +323,22 @@ def next_on_line(
     offset: FloatArray,
     fraction: float,
     before: FloatArray,
+    begin: FloatArray,
     after: FloatArray,
 ) -> bool:
     """Fill the posture at a fraction of the line, from the one before it; False if there is none.
 
     A joint that would exceed a limit is set to it and locked, and the posture solved again.
+
+    Args:
+        scene: The scene.
+        line: The line, and the joints that rest.
+        offset: Motion of the tool along the line, in A [m], shape (3,).
+        fraction: Where the posture is.
+        before: The posture before it [rad], shape (7,).
+        begin: Where Newton's method begins, which moves the joints the shortest way [rad], shape
+            (7,).
+        after: Filled, shape (7,).
     """
     limits = scene.limits
     for r in range(3):
@@ -336,7 +349,7 @@ def next_on_line(
     while True:
         for k in range(7):
             # Joints locked in this step start at their limit.
-            line.q[k] = after[k] if line.locked[k] == 1 else before[k]
+            line.q[k] = after[k] if line.locked[k] == 1 else begin[k]
         arrived = False
         for _ in range(ITERATIONS):
             if evaluate_on_line(scene, line, line.q) < ON_LINE:
