@@ -27,9 +27,10 @@ from tcs.kernel.motion.straight import (
     LIMITS,
     OFF_LINE,
     StraightWorkspace,
+    evaluate_on_line,
     next_on_line,
     release_joints,
-    tangent_on_line,
+    tangent_where_evaluated,
 )
 from tcs.kernel.problem import Problem
 
@@ -95,8 +96,9 @@ def _lead(
         step = 1 - 2 * side
         _release(scene, line, resting)
         n = first
+        evaluate_on_line(scene, line, points[n])
         while True:
-            if not tangent_on_line(scene, line, offset, points[n], slopes[n]):
+            if not tangent_where_evaluated(scene, line, offset, slopes[n]):
                 return LIMITS
             before, begin = n, points[n]
             if not are_kept(fastest, slopes[n]):

@@ -217,8 +217,9 @@ def _search_lines(problem: Problem, approach: Approach, fastest: FloatArray, q: 
     """Follow lines of the shortest joint motion where limits or contacts leave a doubt.
 
     They are those through the posture that scoring found, through nodes of the narrowest level of
-    each branch, and through nodes at the begin: most of what is open there may lead into a window
-    at the goal that is narrower than the spacing of the columns, or into another branch.
+    each branch and of narrow windows at the goal, and through nodes at the begin: most of what is
+    open there may lead into a window at the goal that is narrower than the spacing of the columns,
+    or into another branch.
 
     Args:
         problem: The scene.
@@ -244,7 +245,9 @@ def _search_lines(problem: Problem, approach: Approach, fastest: FloatArray, q: 
         if level == NOWHERE or (level < PIECES and not _may_hide(grid.slack[b], grid.origin[1])):
             continue
         in_doubt = True
-        if lead_through_windows(problem, approach, fastest, b, narrowest_level(approach, b)):
+        level = narrowest_level(approach, b)
+        # All that is open at the begin follows below.
+        if level < PIECES and lead_through_windows(problem, approach, fastest, b, level):
             return True
         open_goal(problem, approach, b, 0, columns[0] - 1)
         if lead_through_narrow(problem, approach, fastest, b, GOAL):

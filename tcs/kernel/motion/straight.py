@@ -390,8 +390,16 @@ def tangent_on_line(
     tangent: FloatArray,
 ) -> bool:
     """Fill the derivative of the joints by the fraction of the line; False at a singularity."""
-    newton = line.newton
     evaluate_on_line(scene, line, q)
+    return tangent_where_evaluated(scene, line, offset, tangent)
+
+
+@inner
+def tangent_where_evaluated(
+    scene: MotionScene, line: StraightWorkspace, offset: FloatArray, tangent: FloatArray
+) -> bool:
+    """Do as `tangent_on_line` at the posture of the last evaluation."""
+    newton = line.newton
     factorise(newton, 0.0)
     for r in range(3):
         newton.error[r], newton.error[3 + r] = 0.0, offset[r]
