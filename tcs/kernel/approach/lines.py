@@ -69,7 +69,7 @@ def lead_from(
     for k in range(7):
         if outcome == DONE:
             break
-        slack = min(q[k] - scene.lower[k], scene.upper[k] - q[k])
+        slack = min(q[k] - scene.limits.lower[k], scene.limits.upper[k] - q[k])
         if line.locked[k] == 0 and slack < RESTS:
             rested = _lead(problem, approach, fastest, first, q, k)
             if rested != LIMITS:
