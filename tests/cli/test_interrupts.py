@@ -13,6 +13,7 @@ from pathlib import Path
 import joblib
 import pytest
 
+from tests.chosen import some_of
 from tests.fresh import fresh
 
 
@@ -76,18 +77,24 @@ def test_bar_on_a_terminal(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-SIGNALS = pytest.mark.parametrize(
-    ("number", "code", "line"),
-    [
-        (signal.SIGINT, 130, "tcs: interrupted; no half-written file is left.\n"),
-        (signal.SIGTERM, 143, "tcs: terminated; no half-written file is left.\n"),
-        (signal.SIGHUP, 129, "tcs: hung up; no half-written file is left.\n"),
-    ],
-    ids=["ctrl-c", "terminated", "hung-up"],
-)
+ENDINGS = [
+    (signal.SIGINT, 130, "tcs: interrupted; no half-written file is left.\n"),
+    (signal.SIGTERM, 143, "tcs: terminated; no half-written file is left.\n"),
+    (signal.SIGHUP, 129, "tcs: hung up; no half-written file is left.\n"),
+]
 
 
-@SIGNALS
+def signals(*quick: int):
+    """Give a test every signal; all but some are slow, as one handler takes them all."""
+    chosen = [ending for ending in ENDINGS if ending[0] in quick]
+    return pytest.mark.parametrize(
+        ("number", "code", "line"),
+        some_of(ENDINGS, *chosen),
+        ids=["ctrl-c", "terminated", "hung-up"],
+    )
+
+
+@signals(signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 def test_interrupt_while_scoring(tmp_path, number, code, line):
     script = f"import sys\n{SLOW_SCORE.replace('time.sleep', 'print(0, flush=True); time.sleep')}\n"
     script += "from tcs.cli import main\nmain()"
@@ -105,7 +112,7 @@ def test_interrupt_while_scoring(tmp_path, number, code, line):
     assert list(tmp_path.iterdir()) == []
 
 
-@SIGNALS
+@signals(signal.SIGINT)
 @pytest.mark.parametrize("module", ["tcs.cli.app", "typer", "tcs.cli.view", "numpy"])
 def test_interrupt_while_modules_are_imported(process, module, number, code, line):
     before = f"""
@@ -120,7 +127,7 @@ sys.meta_path.insert(0, Interrupting())
     assert (ran.code, ran.out, ran.err) == (code, "", line)
 
 
-@SIGNALS
+@signals(signal.SIGTERM)
 def test_interrupt_that_an_import_replaces_by_another_error(process, number, code, line):
     # As compiled modules do: their import ends in an ImportError.
     before = f"""
@@ -138,7 +145,7 @@ sys.meta_path.insert(0, Interrupting())
     assert (ran.code, ran.out, ran.err) == (code, "", line)
 
 
-@SIGNALS
+@signals(signal.SIGHUP)
 def test_interrupt_while_the_command_line_is_parsed(process, number, code, line):
     before = f"""
 import signal
@@ -151,7 +158,7 @@ typer.core.TyperGroup.parse_args = parse_args
     assert (ran.code, ran.out, ran.err) == (code, "", line)
 
 
-@SIGNALS
+@signals(signal.SIGINT)
 def test_interrupt_while_a_compiled_module_is_loaded_waits_for_its_end(process, number, code, line):
     # Drake logs an exception raised there, with its traceback.
     before = f"""
@@ -171,7 +178,7 @@ sys.meta_path.insert(0, Loading())
     assert (ran.code, ran.out, ran.err) == (code, "loaded\n", line)
 
 
-@SIGNALS
+@signals(signal.SIGTERM)
 def test_interrupt_of_python_code_run_by_compiled_code_ends_with_the_exit_code(
     tmp_path, number, code, line
 ):

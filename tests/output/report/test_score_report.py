@@ -10,6 +10,7 @@ import shlex
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 import tcs
@@ -58,10 +59,23 @@ def report(score_path, _small_pictures):
     return make_score_report(score_path, sizes=CHECK)
 
 
+def _leave_undrawn(patch):
+    """Leave the pictures of stops empty, which take half of the time."""
+    patch.setattr("tcs.output.report.score.report.member_figure", lambda *_: Figure())
+
+
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Pictures are not looked at: `report` has them drawn."""
+    _leave_undrawn(monkeypatch)
+
+
 @pytest.fixture(scope="module")
 def single(score_path, _small_pictures):
     """A report on a single base pose, which does not reach every goal."""
-    return make_score_report(score_path, max_members=1, sizes=CheckSizes(pairs=0, dense=0))
+    with pytest.MonkeyPatch.context() as patch:
+        _leave_undrawn(patch)
+        return make_score_report(score_path, max_members=1, sizes=CheckSizes(pairs=0, dense=0))
 
 
 @pytest.fixture(scope="module")
@@ -274,7 +288,7 @@ def test_commands_make_the_same_again(report, score_path):
     assert report.file.metadata["scene_digest"] in made
 
 
-def test_on_the_command_line(score_path, tmp_path):
+def test_on_the_command_line(score_path, tmp_path, undrawn):
     out = tmp_path / "page.html"
     words = ("report", score_path, "--out", out, "--md", "--pairs", 3, "--dense", 2, "--json")
     ran = CliRunner().invoke(app, [str(word) for word in words], catch_exceptions=False)
@@ -303,7 +317,7 @@ def test_a_file_without_reached_goals_has_a_page(tmp_path):
     assert found.views == ()
 
 
-def test_a_false_answer_ends_in_an_exit_code(false_path, tmp_path):
+def test_a_false_answer_ends_in_an_exit_code(false_path, tmp_path, undrawn):
     out = tmp_path / "page.md"
     words = ("report", false_path, "--out", out, "--pairs", 2, "--dense", 0)
     ran = CliRunner().invoke(app, [str(word) for word in words], catch_exceptions=False)
