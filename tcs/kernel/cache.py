@@ -150,12 +150,12 @@ class _Entry(CPUDispatcher):
         """
         code: object = self._cache  # type: ignore[attr-defined]
         kept = isinstance(code, CodeCache) and code.path(sig, self.targetctx).exists()
-        while not kept and _to_announce:
-            _to_announce.pop()()
-        check_room(CODE if kept else COMPILING)
         before = gc.get_threshold()
         gc.set_threshold(*_COLLECTIONS)
         try:
+            while not kept and _to_announce:
+                _to_announce.pop()()
+            check_room(CODE if kept else COMPILING)
             return super().compile(sig)
         finally:
             gc.set_threshold(*before)

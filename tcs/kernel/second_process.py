@@ -16,13 +16,17 @@ from typing import Any
 
 from tcs.files.memory import is_limited
 from tcs.kernel.cache import announced, jit_folder
-from tcs.kernel.quick_flags import quicken_flags
+from tcs.kernel.quick_numba import quicken_numba
 
 _CODE = "from tcs.kernel.second_process import do_call; do_call()"
 
 
 @contextmanager
-def compiled_beside(function: Callable[..., object], *arguments: object) -> Iterator[None]:
+def compiled_beside(
+    function: Callable[..., object],
+    *arguments: object,
+    first: Callable[[], object] | None = None,
+) -> Iterator[None]:
     """Call a function in a second process as soon as anything is compiled within the context.
 
     What it compiles is in the cache at the end of the context, unless the second process failed or
@@ -31,11 +35,19 @@ def compiled_beside(function: Callable[..., object], *arguments: object) -> Iter
     Args:
         function: A function of a module that imports little.
         *arguments: Its arguments.
+        first: Called in this process once the second one is begun, before anything else is
+            compiled: compiles what the second one, which has more to do, comes to later.
     """
     begun: list[subprocess.Popen[bytes]] = []
     useful = _processors() > 1 and jit_folder() is not None and not is_limited()
+
+    def begin() -> None:
+        _begin(begun, (function, arguments))
+        if begun and first is not None:
+            first()
+
     try:
-        with announced((lambda: _begin(begun, (function, arguments))) if useful else None):
+        with announced(begin if useful else None):
             yield
         for process in begun:
             process.wait()
@@ -64,7 +76,7 @@ def _begin(begun: list[subprocess.Popen[bytes]], call: tuple[Any, ...]) -> None:
 
 def do_call() -> None:
     """Do the call that comes by the standard input; the second process does nothing else."""
-    quicken_flags()
+    quicken_numba()
     # Read as a whole, that the other process may go on: the modules take a second to import.
     function, arguments = pickle.loads(sys.stdin.buffer.read())
     function(*arguments)

@@ -18,6 +18,7 @@ import numba
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.datamodel import models
+from numba.core.registry import CPUDispatcher
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
 from numba.extending import intrinsic, lower_getattr_generic, register_model
 
@@ -103,6 +104,20 @@ def field_class(numba_type: Any, name: str) -> type:
     """Return the class of a field, a named tuple too, of what `tuple_class` takes."""
     owned = numba_type.owned if isinstance(numba_type, UnownedView) else numba_type
     return tuple_class(owned.types[owned.fields.index(name)])
+
+
+def compile_for_views(function: object, *arguments: object) -> None:
+    """Compile a function of `cache.inner`, or load it, as it is called from compiled functions.
+
+    Args:
+        function: The function.
+        *arguments: What it is called with; of named tuples, views are passed.
+    """
+    if isinstance(function, CPUDispatcher):
+        found = map(numba.typeof, arguments)
+        function.compile(
+            tuple(UnownedView(t) if isinstance(t, types.BaseNamedTuple) else t for t in found)
+        )
 
 
 if TYPE_CHECKING or vars(numba.config)["DISABLE_JIT"]:

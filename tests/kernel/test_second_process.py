@@ -10,7 +10,7 @@ import pytest
 
 from tcs.kernel import second_process
 from tcs.kernel.analytic.ik import within
-from tcs.kernel.cache import jit, jit_folder
+from tcs.kernel.cache import announced, jit, jit_folder
 from tcs.kernel.second_process import compiled_beside
 
 
@@ -66,10 +66,19 @@ def test_it_is_not_begun_in_vain(folder, monkeypatch, why):
         monkeypatch.setattr(second_process, "_processors", lambda: 1)
     if why == "no cache":
         monkeypatch.setattr(second_process, "jit_folder", lambda: None)
-    with compiled_beside(compile_one, 0.5):
+    with compiled_beside(compile_one, 0.5, first=lambda: begun.append(2)):
         if why != "nothing is compiled":
             compiled()
     assert begun == []
+
+
+def test_this_process_does_its_share_once_the_other_is_begun(folder):
+    told = []
+    with compiled_beside(compile_one, 0.5, first=lambda: told.append("share")):
+        with announced(lambda: told.append("compiled")):
+            compiled()
+        compiled()
+    assert told == ["compiled", "share"]
 
 
 def test_its_failure_is_none_of_this_process(folder):

@@ -14,17 +14,22 @@ from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
 from tcs.kernel.cache import inner
 from tcs.kernel.collide import CENTRE, COLUMNS
 from tcs.kernel.contacts import BASE_FIXED
+from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.motion.box_trees import grouped
+from tcs.kernel.motion.edges import curve_is_free, is_placed_free
 from tcs.kernel.motion.never_in_contact import needed_pairs
 from tcs.kernel.motion.scene import (
     MotionScene,
     MotionWorkspace,
     carriers,
     moved_shapes,
+    new_motion_workspace,
     torso_scene,
     with_pairs,
 )
 from tcs.kernel.problem import Problem
+from tcs.kernel.scores import JOINTS
+from tcs.kernel.views import compile_for_views
 from tcs.kernel.workspace import Workspace
 
 AWAY = 1e3
@@ -74,6 +79,20 @@ def approach_scene(problem: Problem) -> LineScene:
     moving = np.flatnonzero(_is_moved(of_robot))
     first_shape = len(scene.shapes.links) + problem.environment.body.size
     return LineScene(scene, first_shape + moving, np.ascontiguousarray(of_robot[:, moving]))
+
+
+def compile_checks(problem: Problem) -> None:
+    """Compile the certified checks of postures and curves, as lines are followed with them.
+
+    They are a fifth of what approaches are compiled from, and need nothing that the inverse
+    kinematics decides.
+    """
+    scene = torso_scene(problem, 0)
+    work = new_motion_workspace(scene)
+    # Scoring without approach needs the first, too.
+    compile_for_views(measure_at, problem, np.empty(JOINTS))
+    compile_for_views(is_placed_free, scene, work)
+    compile_for_views(curve_is_free, scene, work, True)
 
 
 def _is_apart_from_torso(problem: Problem, scene: MotionScene) -> BoolArray:

@@ -129,10 +129,13 @@ class ApproachScorer:
 
     def compiled_beside(self) -> AbstractContextManager[None]:
         """Have a second process compile what `warm_up` needs, if this one compiles within."""
+        from tcs.kernel.approach.scene import compile_checks
         from tcs.kernel.approach.sweep import score_approaches
 
         return compiled_beside(
-            score_approaches, self.problem, self.lines, no_rows(), self._no_pairs()
+            score_approaches,
+            *(self.problem, self.lines, no_rows(), self._no_pairs()),
+            first=lambda: compile_checks(self.problem),
         )
 
     def _no_pairs(self) -> ReachedPairs:

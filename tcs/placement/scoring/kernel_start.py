@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from tcs.kernel.analytic.solver import is_outside
 from tcs.kernel.cache import announced
 from tcs.kernel.problem import Problem
-from tcs.kernel.quick_flags import quicken_flags
+from tcs.kernel.quick_numba import quicken_numba
 from tcs.kernel.rows import no_rows
 from tcs.kernel.sweep import score
 from tcs.placement.scoring.approaches import ApproachScorer
@@ -62,7 +62,7 @@ def warm_up(
         MemoryError: If the address space is limited, and too little is left.
     """
     begun = time.perf_counter()
-    quicken_flags()
+    quicken_numba()
     with announced(on_compile):
         with nullcontext() if approaches is None else approaches.compiled_beside():
             score(problem, no_rows())

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
 
+from tcs.kernel.approach.scene import compile_checks
 from tcs.kernel.approach.sweep import ApproachLines, ReachedPairs, approach_spline, score_approaches
 from tcs.kernel.arrays import SPHERE
 from tcs.kernel.contacts import NO_CONTACT
+from tcs.kernel.dexterity.measures import measure_at
+from tcs.kernel.motion.edges import curve_is_free, is_placed_free
 from tcs.kernel.problem import build_problem
 from tcs.kernel.rows import grid_rows, rows_at
 from tcs.kernel.scores import APPROACH_BLOCKED, APPROACH_LIMITS, REACHED
@@ -71,6 +74,15 @@ def test_every_outcome_occurs_and_the_best_posture_stays_where_it_is_approachabl
     assert np.all(found.dexterity[reached] <= scores.dexterity[at][reached] + 1e-3)
     assert not found.dexterity[~reached].any()
     np.testing.assert_array_equal(found.contact != NO_CONTACT, found.reason == APPROACH_BLOCKED)
+
+
+def test_checks_that_are_compiled_beforehand_are_those_that_approaches_use(scene, found):
+    functions = measure_at, is_placed_free, curve_is_free
+    before = [sum(function.stats.cache_misses.values()) for function in functions]
+    compile_checks(build_problem(scene))
+    # For other types they would be compiled anew.
+    assert before == [sum(function.stats.cache_misses.values()) for function in functions]
+    assert all(function.signatures for function in functions)
 
 
 def test_approaches_are_straight_within_limits_and_free_by_the_reference(scene, found):
