@@ -29,6 +29,8 @@ def test_json_and_text(tcs_command, tmp_path, capsys, monkeypatch):
 def test_scoring_with_refinement(tcs_command, tmp_path, monkeypatch):
     monkeypatch.setattr("tcs.placement.refinement.refined_file.FRESH_SAMPLES", 20)
     monkeypatch.setattr("tcs.placement.refinement.refined_file.starting_sets", one_start)
+    # Of forty rounds; what more of them find is tested with the search.
+    monkeypatch.setitem(tcs.refine.__kwdefaults__, "rounds", 2)
     environment, path = tmp_path / "beside.yaml", tmp_path / "a.tcs"
     environment.write_text(BESIDE)
     words = ("score", "shaving", "--environment", environment, "--out", path, "--refine")
