@@ -179,11 +179,15 @@ def test_an_interrupt_ends_in_one_line_and_leaves_the_file(stored, tmp_path):
     "words",
     [
         ("evaluate", "{file}", "--samples", "20"),
-        ("robustify", "{file}", "--samples", "8", "--sets", "8", "--out", "{out}"),
-        ("population", "{file}", "--bodies", "3", "--sets", "1"),
-        # `tests/motion/test_kept_outcomes.py` has the same of motions, without the command line.
-        pytest.param(
-            ("motions", "{file}", "--most", "1", "--out", "{out}"), marks=pytest.mark.slow
+        # `test_kept_runs`, `test_kept_people` and `test_kept_outcomes` have the same of these
+        # three, without the command line.
+        *(
+            pytest.param(words, marks=pytest.mark.slow)
+            for words in (
+                ("robustify", "{file}", "--samples", "8", "--sets", "8", "--out", "{out}"),
+                ("population", "{file}", "--bodies", "3", "--sets", "1"),
+                ("motions", "{file}", "--most", "1", "--out", "{out}"),
+            )
         ),
         ("capability", "from-ik", "--step", "0.2", "--radius", "0.5", "--out", "{out}"),
     ],
