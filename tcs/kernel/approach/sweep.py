@@ -24,7 +24,7 @@ from tcs.kernel.motion.scene import NO_PAIR
 from tcs.kernel.motion.straight import DONE
 from tcs.kernel.problem import Problem
 from tcs.kernel.rows import Rows
-from tcs.kernel.scores import APPROACH_BLOCKED, REACHED
+from tcs.kernel.scores import APPROACH_BLOCKED, JOINTS, REACHED
 from tcs.kernel.views import unowned
 
 
@@ -74,7 +74,7 @@ def score_approaches(
     memory = new_approach(problem, approach_scene(problem)) if memory is None else memory
     # Other orders in memory are other types, for which the code would be compiled anew.
     pairs = pairs._replace(pair=np.ascontiguousarray(pairs.pair, dtype=np.int64))
-    _score_approaches(problem, memory, lines, rows, pairs)
+    _approach(problem, memory, lines, rows, pairs, np.empty(0))
 
 
 def approach_spline(
@@ -101,30 +101,15 @@ def approach_spline(
         Hermite spline.
     """
     approach = new_approach(problem, approach_scene(problem) if scene is None else scene)
-    posture = np.array(q, dtype=np.float64)
-    if _follow_posture(problem, approach, lines, row, goal, posture) != DONE:
+    at = ReachedPairs(
+        np.array([[0, goal]]), np.zeros(1, np.uint8), np.zeros(1, np.int32),
+        np.zeros(1, np.float32), np.zeros((1, JOINTS), np.float32),
+    )  # fmt: skip
+    if _approach(problem, approach, lines, row, at, np.array(q, dtype=np.float64)) != DONE:
         return None
     count = approach.curve.pieces[0] + 1
     points, tangents = approach.curve.points[:count], approach.curve.tangents[:count]
     return points[::-1].copy(), -tangents[::-1]
-
-
-@jit
-def _follow_posture(
-    owned_problem: Problem,
-    owned_approach: AnyApproach,
-    owned_lines: ApproachLines,
-    owned_row: Rows,
-    goal: int,
-    q: FloatArray,
-) -> int:
-    problem, approach = unowned(owned_problem), unowned(owned_approach)
-    lines, row = unowned(owned_lines), unowned(owned_row)
-    state, torso = row.state[0], row.torso[0]
-    place_base(problem, approach.work, row, 0)
-    _place_surroundings(problem, approach, torso)
-    _place_goal(problem, approach, lines, state, torso, goal)
-    return follow_posture(problem, approach, lines.fastest[goal], q)
 
 
 @inner
@@ -153,13 +138,29 @@ def _place_goal(
 
 
 @jit
-def _score_approaches(
+def _approach(
     owned_problem: Problem,
     owned_approach: AnyApproach,
     owned_lines: ApproachLines,
     owned_rows: Rows,
     owned_pairs: ReachedPairs,
-) -> None:
+    posture: FloatArray,
+) -> int:
+    """Replace the scores of pairs; or follow the line of a posture at the first pair.
+
+    One function, as scoring follows lines too: two would be compiled from almost the same code.
+
+    Args:
+        owned_problem: The scene and its goals.
+        owned_approach: Memory of this thread.
+        owned_lines: The approaches of the goals.
+        owned_rows: The configurations.
+        owned_pairs: The pairs; their scores are replaced, unless a line is followed.
+        posture: Joint angles whose line is followed [rad], shape (7,), or (0,) to score.
+
+    Returns:
+        DONE; if a line is followed, why not.
+    """
     problem, approach = unowned(owned_problem), unowned(owned_approach)
     lines, rows, pairs = unowned(owned_lines), unowned(owned_rows), unowned(owned_pairs)
     work, q, last = approach.work, np.empty(7), -1
@@ -172,6 +173,8 @@ def _score_approaches(
             last = row
             _place_surroundings(problem, approach, torso)
         _place_goal(problem, approach, lines, state, torso, g)
+        if len(posture) > 0:
+            return follow_posture(problem, approach, lines.fastest[g], posture)
         for k in range(7):
             q[k] = pairs.joints[n, k]
         outcome = approach_pair(problem, approach, lines.fastest[g], q)
@@ -185,3 +188,4 @@ def _score_approaches(
             for k in range(7):
                 pairs.joints[n, k] = q[k]
             pairs.dexterity[n] = measure_at(problem, q)
+    return DONE
