@@ -107,17 +107,24 @@ def field_class(numba_type: Any, name: str) -> type:
 
 
 def compile_for_views(function: object, *arguments: object) -> None:
-    """Compile a function of `cache.inner`, or load it, as it is called from compiled functions.
+    """Compile a function, or load it, as it is called from compiled functions.
 
     Args:
-        function: The function.
-        *arguments: What it is called with; of named tuples, views are passed.
+        function: A function of `cache.inner` or `cache.jit`.
+        *arguments: What it is called with: of named tuples, views are passed, and of a bool or an
+            int, the constant.
     """
-    if isinstance(function, CPUDispatcher):
-        found = map(numba.typeof, arguments)
-        function.compile(
-            tuple(UnownedView(t) if isinstance(t, types.BaseNamedTuple) else t for t in found)
-        )
+    callee = getattr(function, "inner", function)
+    if isinstance(callee, CPUDispatcher):
+        callee.compile(tuple(map(_type_in_call, arguments)))
+
+
+def _type_in_call(argument: object) -> types.Type:
+    """Return the numba type of an argument in a call from a compiled function."""
+    if isinstance(argument, (bool, int)):
+        return types.literal(argument)
+    found = numba.typeof(argument)
+    return UnownedView(found) if isinstance(found, types.BaseNamedTuple) else found
 
 
 if TYPE_CHECKING or vars(numba.config)["DISABLE_JIT"]:
