@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,10 +150,23 @@ SAME_VALUE = 1e-6
 """Difference [m or rad] below which a present value counts as a scored one."""
 
 
+class AxisConstraint(NamedTuple):
+    """A constraint on the values of an axis."""
+
+    name: str
+    axis: Axis
+    admitted: BoolArray
+    """Which values of the axis it admits, shape (count,)."""
+    admits: Callable[[FloatArray], BoolArray]
+    """Returns which values between those of the axis it admits, shape (n,)."""
+    warning: str
+    """What the user should know; "" for nothing."""
+
+
 def axis_constraints(
     constraints: Constraints, now: Mapping[str, float], grid: Grid
-) -> Iterator[tuple[str, Axis, BoolArray, str]]:
-    """Yield each constraint on an axis: its name, axis, admitted values (count,) and a warning.
+) -> Iterator[AxisConstraint]:
+    """Yield each constraint on an axis.
 
     Args:
         constraints: The constraints, of which `only` and `keep` are read.
@@ -175,7 +189,8 @@ def axis_constraints(
                 f"only {condition.text} excludes nothing: the grid has {axis.name} "
                 f"{values_text(axis)}."
             )
-        yield f"only {condition.text}", axis, admitted, warning
+        admits = partial(condition.satisfied, axis)
+        yield AxisConstraint(f"only {condition.text}", axis, admitted, admits, warning)
     for name in constraints.keep:
         axis = axis_named(grid, name, where="keep")
         index, error = _present(axis, now)
@@ -185,7 +200,22 @@ def axis_constraints(
                 f"keep {axis.name}: the present value {_shown(axis, now[axis.name])} is not "
                 f"scored; the scores are those of {_shown(axis, float(axis.values[index]))}."
             )
-        yield f"keep {axis.name}", axis, np.arange(axis.count) == index, warning
+        kept = np.arange(axis.count) == index
+        admits = partial(_is_kept, axis, now[axis.name])
+        yield AxisConstraint(f"keep {axis.name}", axis, kept, admits, warning)
+
+
+def _is_kept(axis: Axis, now: float, values: FloatArray) -> BoolArray:
+    """Return which values of an axis are the present one, shape (n,)."""
+    return np.asarray(_apart(axis, values, now) <= SAME_VALUE)
+
+
+def _apart(axis: Axis, values: FloatArray, now: float) -> FloatArray:
+    """Return the distances of values of an axis from the present one [m or rad]."""
+    apart = np.abs(values - now)
+    if axis.name == "base_yaw":
+        apart = np.abs(np.mod(apart + math.pi, 2.0 * math.pi) - math.pi)
+    return apart
 
 
 def kept_conditions(keep: tuple[str, ...], now: Mapping[str, float], grid: Grid) -> tuple[str, ...]:
@@ -221,9 +251,7 @@ def _present(axis: Axis, now: Mapping[str, float]) -> tuple[int, float]:
         raise SelectionError(
             f"keep {axis.name}: the current state lacks its value. Give it: --at {key}=VALUE."
         )
-    apart = np.abs(axis.values - now[axis.name])
-    if axis.name == "base_yaw":
-        apart = np.abs(np.mod(apart + math.pi, 2.0 * math.pi) - math.pi)
+    apart = _apart(axis, axis.values, now[axis.name])
     index = int(np.argmin(apart))
     half = (math.radians(axis.step) if axis.unit == "deg" else axis.step) / 2.0
     # A single value has no neighbour that shows what range it covers.

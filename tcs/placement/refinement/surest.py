@@ -24,7 +24,7 @@ from tcs.placement.refinement.local_search import (
     Walk,
 )
 from tcs.placement.refinement.success_under_error import RememberedSamples
-from tcs.placement.selection.alternatives import Distinct, SetPositions
+from tcs.placement.selection.alternatives import Distinct
 from tcs.placement.tables import SetTable
 
 ENDS = (32, 128, 512)
@@ -166,8 +166,7 @@ def surest_pairs(
     while len(chosen) < count and np.any(differs):
         k = int(np.argmax(differs))
         chosen.append((int(pairs[0][k]), int(pairs[1][k])))
-        offered = tuple(SetPositions.of_candidates(sets, pair) for pair in chosen)
-        differs = Distinct(sets, apart, offered).of_sets(pairs)
+        differs = Distinct(sets, apart, chosen).of_sets(pairs)
         differs[k] = False
     return [tuple(int(h) for h in sets.candidates[list(pair)]) for pair in chosen]
 

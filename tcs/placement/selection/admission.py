@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import SelectionError
-from tcs.model.grid import Grid, InitialConfiguration
+from tcs.model.grid import InitialConfiguration
 from tcs.placement.constraints import (
     Constraints,
     Footprint,
@@ -21,6 +21,7 @@ from tcs.placement.constraints import (
     blocked_solutions,
 )
 from tcs.placement.selection.choice import Choice, Left, SelectionTables
+from tcs.placement.selection.index import SetIndex
 from tcs.placement.selection.observed import Match
 from tcs.placement.selection.travel import current_values
 from tcs.placement.store import MotionFile, ScoreFile, StateTables
@@ -35,11 +36,11 @@ class Admitted:
     """The candidates that satisfy all constraints, and what they still reach."""
 
     candidates: BoolArray
-    """Whether a candidate satisfies them, shape (C,)."""
+    """Whether a candidate satisfies them, shape (C + M,): see `SetIndex`."""
     reached: BoolArray
-    """Whether a candidate reaches a goal by a solution that no obstacle blocks, shape (C, G)."""
+    """Whether a candidate reaches a goal by a solution that no obstacle blocks, (C + M, G)."""
     dexterity: NDArray[np.float32]
-    """Its dexterity there, 0 where not reached, shape (C, G)."""
+    """Its dexterity there, 0 where not reached, shape (C + M, G)."""
     left: tuple[Left, ...]
     """What each constraint leaves."""
     warnings: tuple[str, ...]
@@ -52,14 +53,18 @@ class Admitted:
 
 
 def admitted_candidates(
-    constraints: Constraints, here: InitialConfiguration | None, tables: SelectionTables
+    constraints: Constraints,
+    here: InitialConfiguration | None,
+    tables: SelectionTables,
+    index: SetIndex,
 ) -> Admitted:
     """Return the candidates that satisfy all constraints.
 
     Args:
         constraints: The constraints.
         here: The current state, for `keep`; None if it is not known.
-        tables: The candidates.
+        tables: The table that they are of.
+        index: The candidates; what a constraint leaves is counted on the grid.
 
     Raises:
         UnknownNameError: If the grid has no such axis.
@@ -68,9 +73,9 @@ def admitted_candidates(
             the scored values, an obstacle is given and the robot's shapes are not known, or no
             candidate is left.
     """
-    sets, grid = tables.sets, tables.grid
-    remaining = np.ones(len(sets.candidates), dtype=np.bool_)
-    reached, dexterity = sets.reached, sets.dexterity
+    grid, count = tables.grid, index.on_grid
+    remaining = np.ones(len(index.flat), dtype=np.bool_)
+    reached, dexterity = index.reached_goals, index.dexterity_at
     left: list[Left] = []
     warnings: list[str] = []
     now = {}
@@ -82,17 +87,19 @@ def admitted_candidates(
             )
         now = current_values(here, grid, ())
     of_axes = list(axis_constraints(constraints, now, grid))
-    along = grid.indices(sets.candidates) if of_axes else np.empty((0, 0), np.int64)
-    for name, axis, admitted, warning in of_axes:
-        remaining &= admitted[along[:, grid.axes.index(axis)]]
+    along = grid.indices(index.sets.candidates) if of_axes else np.empty((0, 0), np.int64)
+    for name, axis, admitted, admits, warning in of_axes:
+        number = grid.axes.index(axis)
+        remaining[:count] &= admitted[along[:, number]]
+        remaining[count:] &= admits(index.off_grid[:, number])
         warnings += [warning] if warning else []
-        _note(left, Left(name, _count(remaining)), remaining.size)
+        _note(left, Left(name, _count(remaining[:count])), count)
     footprint = Footprint.of(tables.shapes) if constraints.forbid else None
     if footprint is not None:
-        base, which = _bases(grid, sets.candidates)
+        base, which = _bases(index)
         for region in constraints.forbid:
             remaining &= ~footprint.overlaps(region, base)[which]
-            _note(left, Left(f"forbid {region.name}", _count(remaining)), remaining.size)
+            _note(left, Left(f"forbid {region.name}", _count(remaining[:count])), count)
         if footprint.radius:
             warnings.append(
                 "forbid: the robot's shapes are not stored, so it counts as a circle of "
@@ -104,7 +111,7 @@ def admitted_candidates(
         reached[candidate, goal], dexterity[candidate, goal] = False, 0.0
         remaining &= reached.any(axis=1)
         found = Left(f"blocked {obstacle.name}", _count(remaining), _count(reached[remaining]))
-        _note(left, found, remaining.size)
+        _note(left, found, count)
     return Admitted(
         remaining, reached, dexterity, tuple(left), tuple(warnings), footprint,
         has_lower_scores=bool(constraints.blocked),
@@ -134,15 +141,16 @@ def blocked_pairs(
     return np.concatenate(candidates), np.concatenate(goals)
 
 
-def _bases(
-    grid: Grid, candidates: NDArray[np.int32]
-) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Return the distinct base poses (U, 3) [m, m, rad], and the pose of each candidate (C,)."""
+def _bases(index: SetIndex) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Return the distinct base poses (U, 3) [m, m, rad], and that of each candidate (C + M,)."""
+    grid, candidates, names = index.grid, index.sets.candidates, ("base_x", "base_y", "base_yaw")
     # Neither the environment's state nor the torso level, the fastest axis, moves the base.
     pose = candidates.astype(np.int64) % grid.state_size // grid.shape[-1]
     _, first, which = np.unique(pose, return_index=True, return_inverse=True)
     at = grid.values(candidates[first])
-    return np.stack([at[name] for name in ("base_x", "base_y", "base_yaw")], axis=1), which
+    off_grid = index.off_grid[:, [grid.axes.index(grid.axis(name)) for name in names]]
+    base = np.concatenate([np.stack([at[name] for name in names], axis=1), off_grid])
+    return base, np.concatenate([which, first.size + np.arange(len(off_grid))])
 
 
 def _count(remaining: BoolArray) -> int:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import SelectionError
 from tcs.files.quantities import POSITION
-from tcs.placement.tables import SetTable
 
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
@@ -43,20 +42,20 @@ class Top:
             raise SelectionError(f"min_apart is {self.min_apart!r}; must be 0 to 40 m.")
 
 
-class SetPositions(NamedTuple):
-    """Where a set of m members is; on the grid or off it."""
+class Placed(Protocol):
+    """Candidates with their base cells and states of the environment, e.g. a set table."""
 
-    bases: NDArray[np.float64]
-    """x and y of the base of each member in W [m], shape (m, 2)."""
-    states: IntArray
-    """Number of the state of the environment of each member, shape (m,); of a refined member that
-    of the configuration that it was refined from."""
+    @property
+    def cell(self) -> NDArray[np.int32]:
+        """Base cell of each candidate, shape (C,)."""
 
-    @classmethod
-    def of_candidates(cls, sets: SetTable, rows: Sequence[int]) -> SetPositions:
-        """Return where a set of the grid is, given its candidate numbers."""
-        member = list(rows)
-        return cls(sets.cell_xy[sets.cell[member]], sets.state[member].astype(np.int64))
+    @property
+    def cell_xy(self) -> NDArray[np.float64]:
+        """Position of each base cell in W [m], shape (N, 2)."""
+
+    @property
+    def state(self) -> IntArray:
+        """Number of the environment's state of each candidate, shape (C,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,56 +66,47 @@ class Distinct:
     other, or if their members need different states of the environment.
     """
 
-    sets: SetTable
+    candidates: Placed
     min_apart: float
-    offered: tuple[SetPositions, ...]
+    offered: Sequence[Sequence[int]]
+    """Candidate numbers of the members of each."""
 
     def of_sets(self, members: tuple[IntArray, ...]) -> BoolArray:
         """Return which sets are distinct, given their members of shapes (n,), shape (n,)."""
-        sets = self.sets
+        every = self.candidates
         distinct = np.ones(len(members[0]), dtype=np.bool_)
-        is_one_state = bool(sets.state.min() == sets.state.max())
+        is_one_state = bool(every.state.min() == every.state.max())
         for other in self.offered:
-            bits = self._bits(sets.cell_xy, other)[sets.cell]
-            states = [] if is_one_state else [sets.state[member] for member in members]
-            distinct &= _differ([bits[member] for member in members], states, other)
+            bits = self._bits(every.cell_xy[every.cell[list(other)]])[every.cell]
+            states = [] if is_one_state else [every.state[member] for member in members]
+            of_other = every.state[list(other)]
+            distinct &= _differ([bits[member] for member in members], states, of_other)
         return distinct
 
-    def admits(self, placed: SetPositions) -> bool:
-        """Return whether a set that need not be on the grid is distinct."""
-        return all(
-            _differ(
-                [bits[None] for bits in self._bits(placed.bases, other)],
-                [state[None] for state in placed.states],
-                other,
-            )[0]
-            for other in self.offered
-        )
+    def _bits(self, bases: NDArray[np.float64]) -> NDArray[np.uint8]:
+        """Return from which members of another set each cell is apart, shape (N,).
 
-    def _bits(self, xy: NDArray[np.float64], other: SetPositions) -> NDArray[np.uint8]:
-        """Return from which members of another set positions (n, 2) are apart, shape (n,).
-
-        One bit for each member: there are millions of sets, and few positions.
+        One bit for each member: there are millions of sets, and few cells.
         """
-        offset = xy[:, None] - other.bases
+        offset = self.candidates.cell_xy[:, None] - bases
         apart = np.hypot(offset[..., 0], offset[..., 1]) >= self.min_apart - 1e-9
-        return np.asarray((apart << np.arange(len(other.bases))).sum(axis=1), dtype=np.uint8)
+        return np.asarray((apart << np.arange(len(bases))).sum(axis=1), dtype=np.uint8)
 
 
 def _differ(
-    bits: Sequence[NDArray[np.uint8]], states: Sequence[NDArray[Any]], other: SetPositions
+    bits: Sequence[NDArray[np.uint8]], states: Sequence[IntArray], other: IntArray
 ) -> BoolArray:
     """Return which sets differ from another set, shape (n,).
 
     Args:
         bits: From which members of the other set each member is apart, shapes (n,).
         states: State of the environment of each member, shapes (n,); [] if there is one state.
-        other: The other set.
+        other: States of the members of the other set.
     """
     differ = np.bitwise_and.reduce(list(bits)) != 0
     for far in bits:
-        differ |= far == (1 << len(other.bases)) - 1
+        differ |= far == (1 << len(other)) - 1
     if len(states):
-        same = np.stack(list(states))[:, :, None] == other.states
+        same = np.stack(list(states))[:, :, None] == other
         differ |= ~(np.all(np.any(same, axis=2), axis=0) & np.all(np.any(same, axis=0), axis=1))
     return np.asarray(differ)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -13,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import SelectionError
-from tcs.model.grid import Grid, InitialConfiguration
+from tcs.model.grid import InitialConfiguration
 from tcs.model.random_streams import check_draws, named_generator
 from tcs.placement.constraints import Constraints, disliked_candidates
 from tcs.placement.selection.admission import (
@@ -25,24 +24,32 @@ from tcs.placement.selection.admission import (
 )
 from tcs.placement.selection.alternatives import Distinct, Top
 from tcs.placement.selection.bounds import Bounds
-from tcs.placement.selection.branch_and_bound import best_set
+from tcs.placement.selection.branch_and_bound import best_set, tour_costs
 from tcs.placement.selection.choice import Choice, SelectionTables, changed_axes
-from tcs.placement.selection.distances import ON_EDGE, LatticeDistances
-from tcs.placement.selection.estimated import (
-    Candidates,
-    best_estimated,
+from tcs.placement.selection.index import SetIndex
+from tcs.placement.selection.listed import (
+    ListedSets,
+    answered_by_grid,
     check_estimated,
     none_estimated,
 )
 from tcs.placement.selection.observed import Match, nearest_table
 from tcs.placement.selection.penalties import Penalties, penalties_of
 from tcs.placement.selection.ranking import Ranking, ranking_of
-from tcs.placement.selection.refined import RefinedQuery, grid_only
-from tcs.placement.selection.travel import Legs, TravelWeights, legs_from, shortest_tour
+from tcs.placement.selection.travel import (
+    Legs,
+    TravelWeights,
+    legs_from,
+    shortest_tour,
+    warning_outside,
+)
 from tcs.placement.selection.utility import UtilityWeights, utility
 from tcs.placement.store import MotionFile, ScoreFile
-from tcs.placement.tables import tc_manipulability, tc_reachability
+from tcs.placement.tables import RefinedTable, tc_manipulability, tc_reachability
 from tcs.placement.tables.sets import MOST_MEMBERS
+from tcs.placement.tables.success import NO_MEMBER
+
+FloatArray = NDArray[np.float64]
 
 _DEFAULT_TRAVEL = TravelWeights()
 _NO_CONSTRAINTS = Constraints()
@@ -126,9 +133,13 @@ def select(
             "Nothing to select: no initial configuration reaches a goal. See the reasons with "
             "`tcs explain`, then change the task, the grid or the environment."
         )
+    limbs = match is not None and len(match.by_frame) > 1
+    of_grid = answered_by_grid(constraints, limbs=limbs, motions=motions is not None)
+    index = tables.index if refined and not of_grid else tables.grid_index
     legs = legs_from(
-        here, tables.grid, sets.candidates, sets.cell, tables.index.distances[travel.route], travel
-    )
+        here, tables.grid, sets.candidates, index.cell, index.distances[travel.route], travel,
+        index.off_grid,
+    )  # fmt: skip
     if here is not None and not np.any(legs.reachable):
         raise SelectionError(
             f"From ({here.base_x:.2f}, {here.base_y:.2f}) m no path around the furniture leads to "
@@ -136,7 +147,7 @@ def select(
         )
     found = None
     if constraints.exclude:
-        found = admitted_candidates(constraints, here, tables)
+        found = admitted_candidates(constraints, here, tables, index)
     if match is not None and match.by_frame and isinstance(scores, ScoreFile):
         found = admitted_at_limbs(scores, match, constraints, found)
     if motions is not None:
@@ -153,38 +164,31 @@ def select(
     )
     # Estimates count every goal that a posture reaches.
     ranking = ranked(estimated=tables.success is not None and motions is None)
-    query = _Query(
-        tables, here, legs, ranking, max_members, found, _disliked(constraints.prefer, tables)
-    )
+    disliked = _disliked(constraints.prefer, tables)
+    query = _Query(tables, index, here, legs, ranking, max_members, found, disliked)
     if weights is None and ranking.basis == "success" and not query.has_estimated:
         query = replace(query, ranking=ranked(estimated=False))
-    both = _Both(query, None, constraints)
-    warnings: tuple[str, ...] = ()
-    if refined and tables.refined is not None:
-        limbs = match is not None and len(match.by_frame) > 1
-        only_grid = grid_only(
-            tables.refined, constraints, query.ranking.weights, limbs=limbs,
-            motions=motions is not None,
-        )  # fmt: skip
-        if only_grid:
-            warnings = (f"Refined sets are not compared: {', '.join(only_grid)} need the grid.",)
-        else:
-            compared = RefinedQuery(tables, tables.refined, here, legs, travel, query.ranking)
-            both = replace(both, refined=compared)
-    offered = both.offered(top)
+    if tables.refined is not None and refined and query.lacks_estimates(tables.refined):
+        of_grid = [*of_grid, "success under error"]
+    offered = query.offered(top)
     if not offered:
         raise none_estimated(max_members)
-    best, *others = offered
+    best, *others = (query.choice(rows) for rows in offered)
+    warnings: tuple[str, ...] = ()
+    if tables.refined is not None and refined and of_grid:
+        warnings = (f"Refined sets are not compared: {', '.join(of_grid)} need the grid.",)
     outside = None
     if here is not None and best.refined is None:
-        outside = warning_outside(legs, here, query.tour(best), tables.grid)
+        cells = tuple(int(index.cell[offered[0][i]]) for i in best.order)
+        outside = warning_outside(legs, here, cells, tables.grid)
     if outside is not None:
         warnings = (outside, *warnings)
+    fewer = query.best(None, len(best.members) - 1) if len(best.members) > 1 else None
     return replace(
         best,
         warnings=(*best.warnings, *warnings),
         alternatives=tuple(others),
-        fewer=both.with_fewer(best),
+        fewer=None if fewer is None else query.choice(fewer),
         basis=query.ranking.basis,
         match=match,
         seconds=time.perf_counter() - start,
@@ -238,9 +242,11 @@ def _check_members(requested: int, stored: int) -> None:
 
 @dataclass(frozen=True)
 class _Query:
-    """One selection among the sets of the grid: the sets, the state and the request."""
+    """One selection: the candidates, the state and the request."""
 
     tables: SelectionTables
+    index: SetIndex
+    """The candidates."""
     here: InitialConfiguration | None
     legs: Legs
     ranking: Ranking
@@ -251,6 +257,19 @@ class _Query:
     disliked: tuple[NDArray[np.bool_], ...]
     """Whether a candidate violates each of the preferences, shapes (C,)."""
 
+    def offered(self, top: Top | None) -> list[tuple[int, ...]]:
+        """Return the best set, and further ones that differ from it and from each other."""
+        offered: list[tuple[int, ...]] = []
+        while len(offered) < (1 if top is None else top.count):
+            distinct = None
+            if top is not None and offered:
+                distinct = Distinct(self.index, top.min_apart, offered)
+            found = self.best(distinct, self.max_members)
+            if found is None:
+                break
+            offered.append(found)
+        return offered
+
     def best(self, distinct: Distinct | None, max_members: int) -> tuple[int, ...] | None:
         """Return the candidate numbers of the best set, the first among equals.
 
@@ -260,10 +279,28 @@ class _Query:
 
         Returns:
             The set, or None if no set differs from those.
+
+        Raises:
+            SelectionError: If the success decides, and no set has an estimate.
         """
+        if self.ranking.weights.success > 0.0:
+            listed = ListedSets.estimated(self.tables.success, self.index)
+            best = self._best_listed(listed, distinct, max_members)
+        else:
+            best = self._best_kept(distinct, max_members)
+        refined = self.index.refined
+        if refined is None or self.lacks_estimates(refined):
+            return best
+        listed = ListedSets.refined(self.index)
+        return self._best_listed(listed, distinct, max_members, to_beat=best)
+
+    def lacks_estimates(self, refined: RefinedTable) -> bool:
+        """Return whether the success decides, and that of the refined sets is not known."""
+        return self.ranking.weights.success > 0.0 and refined.success is None
+
+    def _best_kept(self, distinct: Distinct | None, max_members: int) -> tuple[int, ...] | None:
+        """Return the best of the kept sets of the grid; as `best`."""
         legs, weights, to_gain = self.legs, self.ranking.weights, self.ranking.to_gain
-        if weights.success > 0.0:
-            return self._best_estimated(distinct, max_members)
         singles = self.singles.copy()
         if distinct is not None:
             singles[~distinct.of_sets((np.arange(singles.size),))] = -np.inf
@@ -273,7 +310,7 @@ class _Query:
         if best == -np.inf:
             # Excluded candidates have a bound of -inf, which must not suffice.
             rows, best = None, -sys.float_info.max
-        for size, groups in enumerate(self.tables.index.groups[: max_members - 1], 2):
+        for size, groups in enumerate(self.index.groups[: max_members - 1], 2):
             bounds = Bounds(
                 groups, legs, weights.of_size(size), self.found, self.penalties, distinct
             )
@@ -282,107 +319,133 @@ class _Query:
                 rows, best = found.members, found.utility
         return rows
 
-    def _best_estimated(
-        self, distinct: Distinct | None, max_members: int
+    def _best_listed(
+        self,
+        listed: ListedSets,
+        distinct: Distinct | None,
+        max_members: int,
+        to_beat: tuple[int, ...] | None = None,
     ) -> tuple[int, ...] | None:
-        """Return the best of the sets with an estimate; as `best`.
+        """Return the best of some listed sets; as `best`.
 
-        Raises:
-            SelectionError: If no set has an estimate.
+        Args:
+            listed: The sets.
+            distinct: As for `best`.
+            max_members: As for `best`.
+            to_beat: A set that is returned unless one of them is better.
         """
-        sets, success = self.tables.sets, self.tables.success
-        candidates = Candidates(self.admitted, *self.scores, self.penalties, distinct)
-        weights = self.ranking.weights
-        return best_estimated(sets, success, self.legs, weights, max_members, candidates)
+        keys = np.full((3, len(listed.members)), -np.inf)
+        for size in range(1, max_members + 1):
+            rows, members = listed.of_size(size)
+            feasible = np.logical_and.reduce([self.admitted[column] for column in members])
+            if distinct is not None:
+                feasible &= distinct.of_sets(members)
+            rows, members = rows[feasible], tuple(column[feasible] for column in members)
+            if rows.size:
+                keys[:, rows] = self._keys(
+                    members, None if listed.low is None else listed.low[rows]
+                )
+        best = int(np.lexsort(-keys[::-1])[0]) if keys.size else 0
+        if not keys.size or keys[0, best] == -np.inf:
+            return to_beat
+        if to_beat is not None:
+            low = self._low_of(to_beat)
+            columns = tuple(np.array([member]) for member in to_beat)
+            key = self._keys(columns, None if low is None else np.array([low]))
+            if tuple(keys[:, best]) <= tuple(key[:, 0]):
+                return to_beat
+        return tuple(int(i) for i in listed.members[best] if i != NO_MEMBER)
+
+    def _keys(self, members: tuple[NDArray[np.int64], ...], low: FloatArray | None) -> FloatArray:
+        """Return the keys by which sets of one size are compared, of `Ranking.rank`, shape (3, n).
+
+        Args:
+            members: Candidate numbers of their members, shapes (n,).
+            low: Lower confidence bound of their success, shape (n,); None if that is not known.
+        """
+        of_goals, (reached, dexterity) = self.index.sets.weights, self.scores
+        scores = (
+            tc_reachability(np.logical_or.reduce([reached[c] for c in members]), of_goals),
+            tc_manipulability(np.maximum.reduce([dexterity[c] for c in members]), of_goals),
+        )
+        weights = self.ranking.weights.of_size(len(members))
+        value = utility(*scores, tour_costs(self.legs, members), weights, low)
+        if self.penalties is not None:
+            value = value - self.penalties.of_sets(members)
+        return self.ranking.rank(*scores, len(members), value)
 
     @property
     def has_estimated(self) -> bool:
-        """Whether a set with an estimate may be selected."""
-        return self._best_estimated(None, self.max_members) is not None
+        """Whether a set of the grid with an estimate may be selected."""
+        listed = ListedSets.estimated(self.tables.success, self.index)
+        return self._best_listed(listed, None, self.max_members) is not None
 
     @cached_property
-    def singles(self) -> NDArray[np.float64]:
+    def singles(self) -> FloatArray:
         """Utility less penalties of each candidate, -inf where it is not admitted, shape (C,)."""
-        sets = self.tables.sets
+        sets, on_grid = self.index.sets, slice(self.index.on_grid)
         reachability, manipulability = sets.single_reachability, sets.single_manipulability
         if self.found is not None and self.found.has_lower_scores:
             reachability = tc_reachability(self.found.reached, sets.weights)
             manipulability = tc_manipulability(self.found.dexterity, sets.weights)
-        singles = utility(reachability, manipulability, self.legs.from_here, self.ranking.weights)
+        cost = self.legs.from_here[on_grid]
+        singles = utility(reachability, manipulability, cost, self.ranking.weights)
         if self.penalties is not None:
-            singles -= self.penalties.of_candidates
-        singles[~self.admitted] = -np.inf
+            singles -= self.penalties.of_candidates[on_grid]
+        singles[~self.admitted[on_grid]] = -np.inf
         return singles
 
     @cached_property
     def penalties(self) -> Penalties | None:
         """Penalties of the sets, if there are any."""
-        return self._penalties_by(self.ranking.weights)
+        return penalties_of(self.ranking.weights, self.here, self.index, self.disliked)
 
     @cached_property
     def stated_penalties(self) -> Penalties | None:
         """Penalties by the weights of the utility that is stated."""
-        return self._penalties_by(self.ranking.stated)
-
-    def _penalties_by(self, weights: UtilityWeights) -> Penalties | None:
-        tables = self.tables
-        return penalties_of(weights, self.here, tables.grid, tables.sets, self.disliked)
+        return penalties_of(self.ranking.stated, self.here, self.index, self.disliked)
 
     @property
     def scores(self) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
         """What the candidates reach by solutions that are not blocked, and their dexterity."""
         if self.found is None:
-            return self.tables.sets.reached, self.tables.sets.dexterity
+            return self.index.reached_goals, self.index.dexterity_at
         return self.found.reached, self.found.dexterity
 
     @cached_property
     def admitted(self) -> NDArray[np.bool_]:
-        """Whether a candidate is reachable and satisfies the constraints, shape (C,).
+        """Whether a candidate is reachable and satisfies the constraints, shape (C + M,).
 
         Raises:
-            SelectionError: If none is.
+            SelectionError: If none of the grid is.
         """
-        reachable = self.legs.reachable[self.tables.sets.cell]
+        reachable = self.legs.reachable[self.index.cell]
         if self.found is None:
             return reachable
-        both = reachable & self.found.candidates
-        if not np.any(both):
+        both, on_grid = reachable & self.found.candidates, slice(self.index.on_grid)
+        if not np.any(both[on_grid]):
             raise SelectionError(
                 "No path around the furniture leads to any of the "
-                f"{np.count_nonzero(self.found.candidates):,} configurations that the constraints "
-                "leave. Relax a constraint, or use straight lines."
+                f"{np.count_nonzero(self.found.candidates[on_grid]):,} configurations that the "
+                "constraints leave. Relax a constraint, or use straight lines."
             )
         return np.asarray(both)
 
-    def tour(self, choice: Choice) -> tuple[int, ...]:
-        """Return the base cells of a choice, in the order of its tour."""
-        sets = self.tables.sets
-        rows = np.searchsorted(sets.candidates, choice.indices)
-        return tuple(int(sets.cell[rows[i]]) for i in choice.order)
-
     def choice(self, rows: tuple[int, ...]) -> Choice:
         """Return the choice of the set of candidates `rows`."""
-        tables, legs = self.tables, self.legs
+        tables, legs, index = self.tables, self.legs, self.index
         member = np.array(rows)
         between = legs.between(member[:, None], member[None, :])
         cost, order = shortest_tour(legs.from_here_to(member).tolist(), between)
         chosen = self._chosen(rows)
         indices, members = chosen.indices, chosen.members
         reachability, manipulability = chosen.reachability, chosen.manipulability
-        row = tables.success.row_of(indices) if tables.success is not None else None
-        success, interval, low = None, None, None
-        if tables.success is not None and row is not None:
-            success = float(tables.success.success[row])
-            interval = (float(tables.success.low[row]), float(tables.success.high[row]))
-            low = interval[0]
+        success = self._success_of(rows)
+        low = None if success is None else success[1]
         scores, weights = (reachability, manipulability, cost), self.ranking.stated
         net = utility(*scores, weights.of_size(len(rows)), low)
-        ranked = utility(*scores, self.ranking.weights.of_size(len(rows)), low)
-        columns = tuple(member[:, None])
         if self.stated_penalties is not None:
-            net -= float(self.stated_penalties.of_sets(columns)[0])
-        if self.penalties is not None:
-            ranked -= float(self.penalties.of_sets(columns)[0])
+            net -= float(self.stated_penalties.of_sets(tuple(member[:, None]))[0])
         return Choice(
             members=members,
             indices=indices,
@@ -392,83 +455,57 @@ class _Query:
             cost=cost,
             utility=utility(*scores, weights, low),
             net_utility=net,
-            ranked=ranked,
             moves=changed_axes(self.here, members),
-            success=success,
-            success_ci95=interval,
-            unreachable=int(np.count_nonzero(~legs.reachable[tables.sets.cell])),
+            success=None if success is None else success[0],
+            success_ci95=None if success is None else success[1:],
+            unreachable=int(np.count_nonzero(~legs.reachable[index.sets.cell])),
             constraints=self.found.left if self.found is not None else (),
             footprint=self.found.footprint if self.found is not None else None,
+            refined=index.refined_set(rows[0]),
             warnings=self.found.warnings if self.found is not None else (),
-            hands=tables.hands_of(np.where(self.scores[0], tables.sets.served, 0)[member])
+            hands=tables.hands_of(np.where(self.scores[0][member], index.served[member], 0))
             if tables.hand_names
             else (),
             seconds=0.0,
         )
 
+    def _success_of(self, rows: tuple[int, ...]) -> tuple[float, float, float] | None:
+        """Return mean, lower and upper end of the success of a set; None without an estimate."""
+        number, refined = self.index.refined_set(rows[0]), self.index.refined
+        if number is not None:
+            found = None if refined is None else refined.success
+            columns = None if found is None else (found.mean, found.low, found.high)
+        else:
+            known = self.tables.success
+            number = None if known is None else known.row_of(self._chosen(rows).indices)
+            columns = None if known is None else (known.success, known.low, known.high)
+        if columns is None or number is None:
+            return None
+        mean, low, high = (float(column[number]) for column in columns)
+        return mean, low, high
+
+    def _low_of(self, rows: tuple[int, ...]) -> float | None:
+        """Return the lower confidence bound of the success of a set; None without an estimate."""
+        found = self._success_of(rows)
+        return None if found is None else found[1]
+
     def _chosen(self, rows: tuple[int, ...]) -> _ChosenSet:
-        """Return what a set of candidates is from any state; kept with the tables."""
-        tables = self.tables
-        kept: dict[tuple[int, ...], _ChosenSet] = tables.derived.setdefault("chosen sets", {})
-        found = kept.get(rows) if self.found is None else None
+        """Return what a set of candidates is from any state; kept with the candidates."""
+        index = self.index
+        found: _ChosenSet | None = index.chosen.get(rows) if self.found is None else None
         if found is None:
             member = np.array(rows)
-            indices = tuple(int(h) for h in tables.sets.candidates[member])
             reached, dexterity = (of_all[member] for of_all in self.scores)
-            of_goals = tables.sets.weights
+            of_goals = index.sets.weights
             found = _ChosenSet(
-                indices,
-                tuple(tables.grid.configuration(h) for h in indices),
+                tuple(int(h) for h in index.flat[member]),
+                tuple(index.configuration(row) for row in rows),
                 float(tc_reachability(np.any(reached, axis=0), of_goals)),
                 float(tc_manipulability(np.max(dexterity, axis=0), of_goals)),
             )
-            if self.found is None and len(kept) < MOST_CHOSEN:
-                kept[rows] = found
+            if self.found is None and len(index.chosen) < MOST_CHOSEN:
+                index.chosen[rows] = found
         return found
-
-
-@dataclass(frozen=True)
-class _Both:
-    """One selection among the sets of the grid and the refined sets."""
-
-    query: _Query
-    refined: RefinedQuery | None
-    """The refined sets; None without any, or if they are not compared."""
-    constraints: Constraints
-
-    def offered(self, top: Top | None) -> list[Choice]:
-        """Return the best set, and further ones that differ from it and from each other."""
-        offered: list[Choice] = []
-        while len(offered) < (1 if top is None else top.count):
-            distinct = None
-            if top is not None and offered:
-                taken = tuple(choice.placed(self.query.tables.grid) for choice in offered)
-                distinct = Distinct(self.query.tables.sets, top.min_apart, taken)
-            found = self.best(distinct, self.query.max_members)
-            if found is None:
-                break
-            offered.append(found)
-        return offered
-
-    def with_fewer(self, best: Choice) -> Choice | None:
-        """Return the best set with fewer members than another; None if there is none."""
-        return self.best(None, len(best.members) - 1) if len(best.members) > 1 else None
-
-    def best(self, distinct: Distinct | None, max_members: int) -> Choice | None:
-        """Return the best set of the grid, or the best refined set if it is better."""
-        query = self.query
-        rows = query.best(distinct, max_members)
-        best = None if rows is None else query.choice(rows)
-        if self.refined is None:
-            return best
-        refined = self.refined.best(self.constraints, distinct, max_members)
-        rank = query.ranking.rank
-        if refined is None or (best is not None and rank(refined) <= rank(best)):
-            return best
-        if query.found is None:
-            return refined
-        # What a constraint leaves is counted on the grid.
-        return replace(refined, constraints=query.found.left, footprint=query.found.footprint)
 
 
 @dataclass(frozen=True, slots=True)
@@ -481,56 +518,10 @@ class _ChosenSet:
     manipulability: float
 
 
-def warning_outside(
-    legs: Legs, here: InitialConfiguration, cells: tuple[int, ...], grid: Grid
-) -> str | None:
-    """Return a warning if the path around the furniture leaves the grid, else None.
-
-    Args:
-        legs: Travel from the current state, by either route; a straight path, which ignores the
-            furniture, causes no warning.
-        here: The current state.
-        cells: Base cells of the members, in the order of the tour.
-        grid: The scored grid.
-    """
-    distances = legs.distances
-    if not isinstance(distances, LatticeDistances):
-        return None
-    axes = (grid.axis("base_x"), grid.axis("base_y"))
-    low = np.array([axis.values[0] for axis in axes])
-    high = np.array([axis.values[-1] for axis in axes])
-    covered = f"x {low[0]:g} to {high[0]:g} m, y {low[1]:g} to {high[1]:g} m"
-    start = np.array([here.base_x, here.base_y])
-    if np.any((start < low - ON_EDGE) | (start > high + ON_EDGE)):
-        return (
-            f"The path around the furniture starts outside the scored grid ({covered}), where the "
-            "scores do not show what blocks the base."
-        )
-    metres = [float(legs.here_to_cell[cells[0]]) / legs.metre if legs.metre else np.inf]
-    metres += [
-        float(distances.between(np.array(one), np.array(other)))
-        for one, other in itertools.pairwise(cells)
-    ]
-    stops = np.concatenate([start[None], distances.cell_xy[list(cells)]])
-    to_edge = np.minimum(stops - low, high - stops).min(axis=1)
-    # A leg that is too short to reach the edge and return needs no search.
-    if np.all(np.array(metres) <= to_edge[:-1] + to_edge[1:]):
-        return None
-    path = distances.path(float(start[0]), float(start[1]), cells, low, high)
-    outside = np.any((path < low - ON_EDGE) | (path > high + ON_EDGE), axis=1)
-    if not np.any(outside):
-        return None
-    x, y = path[int(np.argmax(outside))]
-    return (
-        f"The path around the furniture leaves the scored grid ({covered}) at ({x:.2f}, {y:.2f}) "
-        "m; beyond it the scores do not show what blocks the base."
-    )
-
-
 def same_set(
     choose: Callable[[InitialConfiguration], Choice],
     here: InitialConfiguration,
-    covariance: NDArray[np.float64],
+    covariance: FloatArray,
     *,
     draws: int = 100,
     seed: int = 0,

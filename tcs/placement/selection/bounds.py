@@ -86,7 +86,9 @@ class Bounds:
             (*weights, per_metre, type(legs.distances)),
             lambda: self._gain(*index.group_scores) - per_metre * index.path(legs.distances),
         )
-        return np.where(legs.reachable, most - self.travel * legs.here_to_cell, -np.inf)
+        # Members of refined sets, behind the candidates of the grid, are in no group.
+        here, reachable = legs.here_to_cell[: most.size], legs.reachable[: most.size]
+        return np.where(reachable, most - self.travel * here, -np.inf)
 
     def of_member(self, group: IntArray, member: IntArray) -> FloatArray:
         """Return bounds on the sets of a group that contain a candidate, shape (n,)."""
@@ -203,11 +205,12 @@ class Bounds:
 
         Penalties are subtracted. It is -inf for candidates that violate a constraint.
         """
-        net = self._member_gain - self._levels
+        on_grid = slice(self._member_gain.size)
+        net = self._member_gain - self._levels[on_grid]
         if self.penalties is not None:
-            net -= self.penalties.of_candidates
+            net -= self.penalties.of_candidates[on_grid]
         if self.admitted is not None:
-            net[~self.admitted.candidates] = -np.inf
+            net[~self.admitted.candidates[on_grid]] = -np.inf
         return net
 
     @cached_property

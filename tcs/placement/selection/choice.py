@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from tcs.errors import SelectionError
 from tcs.model.grid import Grid, InitialConfiguration
 from tcs.placement.constraints import SAME_VALUE, Footprint, Postures
-from tcs.placement.selection.alternatives import SetPositions
 from tcs.placement.selection.index import SetIndex
 from tcs.placement.selection.observed import Match
 from tcs.placement.store import ScoreFile
@@ -116,8 +115,19 @@ class SelectionTables:
 
     @property
     def index(self) -> SetIndex:
-        """The sets, prepared for the search."""
-        return index_of(self.sets, self.derived)
+        """The sets, the refined ones included, prepared for the search."""
+        return self._kept_index("index", self.refined)
+
+    @property
+    def grid_index(self) -> SetIndex:
+        """The sets of the grid alone, prepared for the search."""
+        return self.index if self.refined is None else self._kept_index("grid index", None)
+
+    def _kept_index(self, name: str, refined: RefinedTable | None) -> SetIndex:
+        found = self.derived.get(name)
+        if not isinstance(found, SetIndex) or found.refined is not refined:
+            found = self.derived[name] = SetIndex(self.sets, self.grid, refined)
+        return found
 
 
 def changed_axes(
@@ -133,20 +143,6 @@ def changed_axes(
             for member in members
         )
     )
-
-
-def index_of(sets: SetTable, derived: dict[str, Any]) -> SetIndex:
-    """Return the index of sets, made on the first call.
-
-    Args:
-        sets: The sets.
-        derived: Where the index is kept.
-    """
-    if "index" not in derived:
-        derived["index"] = SetIndex(sets)
-    found = derived["index"]
-    assert isinstance(found, SetIndex)
-    return found
 
 
 def _frames(file: ScoreFile, table: int) -> dict[str, FloatArray]:
@@ -212,8 +208,6 @@ class Choice:
     net_utility: float
     """The utility less the penalties for further members, for moving the environment and for
     violated preferences, by which sets are compared where weights were given."""
-    ranked: float = field(repr=False)
-    """What the set is compared by in this selection: see `tcs.placement.selection.ranking`."""
     moves: tuple[str, ...]
     """Environment axes that change from the present state to the members, or between these."""
     alternatives: tuple[Choice, ...] = ()
@@ -285,11 +279,6 @@ class Choice:
             if self.hands:
                 member["hand"] = list(self.hands[i])
         return plain
-
-    def placed(self, grid: Grid) -> SetPositions:
-        """Return where the bases are, and the states of the environment; on the grid or off it."""
-        bases = np.array([(member.base_x, member.base_y) for member in self.members])
-        return SetPositions(bases, grid.state_of(np.array(self.indices, dtype=np.int64)))
 
     def compared_with(self, best: Choice) -> dict[str, Any]:
         """Return an alternative as plain containers, with what it trades against the best set.

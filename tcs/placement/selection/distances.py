@@ -79,6 +79,9 @@ class LatticeDistances(Distances):
 
     lattice: BaseLattice
     """Where the base can drive."""
+    origin: IntArray | None = None
+    """Cell through which the path to each cell leads, and straight on from there, shape (N,); None
+    if all are positions of the lattice."""
 
     def from_position(self, x: float, y: float) -> FloatArray:
         """Return the distance of each cell from a position [m], shape (N,).
@@ -97,7 +100,7 @@ class LatticeDistances(Distances):
 
         graph = _with_robot(self._graph, *self._entries(x, y))
         found: FloatArray = dijkstra(graph, indices=graph.shape[0] - 1)[self._node]
-        return found
+        return found + self._offset
 
     def path(
         self, x: float, y: float, cells: Sequence[int], low: FloatArray, high: FloatArray
@@ -145,8 +148,19 @@ class LatticeDistances(Distances):
     @cached_property
     def _node(self) -> IntArray:
         """Lattice node of each cell, shape (N,)."""
-        along = np.rint((self.cell_xy - self.lattice.start) / self.lattice.step).astype(np.int64)
+        along = np.rint((self._on_lattice - self.lattice.start) / self.lattice.step)
+        along = along.astype(np.int64)
         return np.asarray(along[:, 0] * self.lattice.shape[1] + along[:, 1])
+
+    @property
+    def _on_lattice(self) -> FloatArray:
+        """Lattice position from which each cell is reached [m], shape (N, 2)."""
+        return self.cell_xy if self.origin is None else self.cell_xy[self.origin]
+
+    @cached_property
+    def _offset(self) -> FloatArray:
+        """Distance of each cell from that position [m], shape (N,)."""
+        return _distance(self._on_lattice, self.cell_xy)
 
     @cached_property
     def _graph(self) -> Any:
@@ -177,7 +191,8 @@ class LatticeDistances(Distances):
         found = np.concatenate(parts) if parts else np.zeros((0, 0))
         # The two directions add the same steps in another order. Two cells without a path between
         # them are never reachable from one position, so their entry is never read.
-        return np.nan_to_num(np.minimum(found, found.T), posinf=0.0)
+        shortest = np.nan_to_num(np.minimum(found, found.T), posinf=0.0)
+        return np.asarray(shortest + self._offset[:, None] + self._offset)
 
     @cached_property
     def _movable(self) -> NDArray[np.bool_]:

@@ -1,17 +1,20 @@
-"""Index of a set table for the search, independent of the query."""
+"""Index of a set table and its refined sets for the search, independent of the query."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tcs.model.grid import Grid, InitialConfiguration
 from tcs.placement.selection.distances import Distances, LatticeDistances, StraightDistances
-from tcs.placement.tables import SetTable
+from tcs.placement.tables import RefinedTable, SetTable
 from tcs.placement.tables.sets import Groups
+from tcs.placement.tables.success import NO_MEMBER
 
 KEPT_WEIGHTS = 16
 """Most weights of selection for which values over the groups are kept, a kilobyte for each."""
@@ -22,10 +25,19 @@ IntArray = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class SetIndex:
-    """The candidates of a set table, by cell and by goal."""
+    """The C candidates of a set table, and behind them the M members of its refined sets.
+
+    A member that is off the grid stands in a base cell of its own, behind the N cells of the grid.
+    """
 
     sets: SetTable
     """The table."""
+    grid: Grid
+    """Grid of the candidates."""
+    refined: RefinedTable | None = None
+    """The refined sets that are compared; None for none."""
+    chosen: dict[tuple[int, ...], Any] = field(default_factory=dict, repr=False)
+    """What chosen sets are from any state, by their candidate numbers."""
 
     @cached_property
     def groups(self) -> tuple[GroupIndex, ...]:
@@ -35,14 +47,94 @@ class SetIndex:
             groups.append(self.sets.triples)
         return tuple(GroupIndex(self, one) for one in groups)
 
+    @property
+    def on_grid(self) -> int:
+        """C, the number of candidates on the grid."""
+        return len(self.sets.candidates)
+
+    @cached_property
+    def refined_rows(self) -> IntArray:
+        """Candidate numbers of the members of refined sets, NO_MEMBER after the last, (K, m)."""
+        if self.refined is None:
+            return np.empty((0, 1), np.int64)
+        is_member = self.refined.origin != NO_MEMBER
+        number = self.on_grid + np.cumsum(is_member).reshape(is_member.shape) - 1
+        return np.where(is_member, number, NO_MEMBER)
+
+    def refined_set(self, member: int) -> int | None:
+        """Return the number of the refined set with a candidate; None for one of the grid."""
+        found = np.argwhere(self.refined_rows == member)
+        return int(found[0, 0]) if member >= self.on_grid else None
+
+    @cached_property
+    def off_grid(self) -> FloatArray:
+        """Values of the grid's axes of each member of a refined set [m or rad], shape (M, axes)."""
+        if self.refined is None:
+            return np.empty((0, len(self.grid.axes)))
+        return np.asarray(self.refined.values[self.refined_rows != NO_MEMBER])
+
+    def _with_refined(self, of_grid: NDArray[Any], of_refined: str) -> NDArray[Any]:
+        """Return an array of the grid's candidates, extended by one of the refined sets."""
+        if self.refined is None:
+            return of_grid
+        members = getattr(self.refined, of_refined)[self.refined_rows != NO_MEMBER]
+        return np.concatenate([of_grid, members])
+
+    @cached_property
+    def flat(self) -> NDArray[np.int32]:
+        """Flat index of each candidate; off the grid where it was refined from, shape (C + M,)."""
+        return self._with_refined(self.sets.candidates, "origin")
+
+    @cached_property
+    def reached_goals(self) -> NDArray[np.bool_]:
+        """Whether a candidate reaches a goal, shape (C + M, G)."""
+        return self._with_refined(self.sets.reached, "reached")
+
+    @cached_property
+    def dexterity_at(self) -> NDArray[np.float32]:
+        """Its dexterity there, shape (C + M, G)."""
+        return self._with_refined(self.sets.dexterity, "dexterity")
+
+    @cached_property
+    def served(self) -> NDArray[np.uint8]:
+        """Number of the hand that reaches it plus 1, 0 for none, shape (C + M, G)."""
+        return self._with_refined(self.sets.served, "served")
+
+    @cached_property
+    def state(self) -> IntArray:
+        """Number of the environment's state, off the grid of the origin, shape (C + M,)."""
+        return self.flat.astype(np.int64) // self.sets.state_size
+
+    @cached_property
+    def cell(self) -> NDArray[np.int32]:
+        """Base cell of each candidate, shape (C + M,)."""
+        own = len(self.sets.cell_xy) + np.arange(len(self.off_grid), dtype=np.int32)
+        return np.concatenate([self.sets.cell, own]) if own.size else self.sets.cell
+
+    @cached_property
+    def cell_xy(self) -> FloatArray:
+        """Position of each base cell in W [m], shape (N + M, 2)."""
+        along = [self.grid.axes.index(self.grid.axis(name)) for name in ("base_x", "base_y")]
+        return np.concatenate([self.sets.cell_xy, self.off_grid[:, along]])
+
     @cached_property
     def distances(self) -> dict[str, Distances]:
         """Distances between the cells, by route."""
-        xy = self.sets.cell_xy
+        xy, origin = self.cell_xy, None
+        if len(self.off_grid):
+            refined_from = np.searchsorted(self.sets.candidates, self.flat[self.on_grid :])
+            cells = np.arange(len(self.sets.cell_xy))
+            origin = np.concatenate([cells, self.sets.cell[refined_from]])
         return {
             "straight": StraightDistances(xy),
-            "around": LatticeDistances(xy, self.sets.lattice),
+            "around": LatticeDistances(xy, self.sets.lattice, origin),
         }
+
+    def configuration(self, candidate: int) -> InitialConfiguration:
+        """Return a candidate as a configuration."""
+        if candidate < self.on_grid:
+            return self.grid.configuration(int(self.sets.candidates[candidate]))
+        return self.grid.between(self.off_grid[candidate - self.on_grid].tolist())
 
     @cached_property
     def start(self) -> IntArray:

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.model.grid import Grid, InitialConfiguration
+from tcs.placement.constraints import SAME_VALUE
+from tcs.placement.selection.index import SetIndex
 from tcs.placement.selection.utility import UtilityWeights
-from tcs.placement.tables import SetTable
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -51,8 +52,7 @@ class Penalties:
 def penalties_of(
     weights: UtilityWeights,
     here: InitialConfiguration | None,
-    grid: Grid,
-    sets: SetTable,
+    index: SetIndex,
     disliked: tuple[BoolArray, ...],
 ) -> Penalties | None:
     """Return the penalties of a selection, None if no set pays any.
@@ -61,13 +61,13 @@ def penalties_of(
         weights: Amounts of the penalties.
         here: The current state, if it is known; without a value of any environment axis, moving it
             is free.
-        grid: Grid of the candidates.
-        sets: The candidates.
+        index: The candidates.
         disliked: Whether a candidate violates each of the preferences, shapes (C,).
     """
     flags, amounts = list(disliked), [float(weights.preference)] * len(disliked)
     if weights.environment > 0.0 and here is not None and here.environment:
-        flags.append(moves_environment(here, grid)[sets.state])
+        of_grid = moves_environment(here, index.grid)[index.sets.state]
+        flags.append(np.concatenate([of_grid, _moves_off_grid(here, index)]))
         amounts.append(float(weights.environment))
     if not flags or not any(amounts):
         return None
@@ -86,3 +86,13 @@ def moves_environment(here: InitialConfiguration, grid: Grid) -> BoolArray:
             away = np.arange(axis.count) != int(np.argmin(np.abs(axis.values - now[axis.name])))
             keeps[(slice(None),) * number + (away,)] = False
     return np.asarray(~keeps.ravel())
+
+
+def _moves_off_grid(here: InitialConfiguration, index: SetIndex) -> BoolArray:
+    """Return which candidates off the grid need another environment than the present, (M,)."""
+    now = dict(here.environment)
+    moves = np.zeros(len(index.off_grid), dtype=np.bool_)
+    for axis, values in zip(index.grid.environment_axes, index.off_grid.T, strict=False):
+        if axis.name in now:
+            moves |= np.abs(values - now[axis.name]) > SAME_VALUE
+    return moves

@@ -8,8 +8,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from tcs.placement.selection.choice import Basis, Choice
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.placement.selection.choice import Basis
 from tcs.placement.selection.utility import UtilityWeights
+
+FloatArray = NDArray[np.float64]
 
 _DEFAULT = UtilityWeights()
 _TIE = 1e-6
@@ -43,12 +48,21 @@ class Ranking:
     """What a set has to gain by a further member: more than the greatest dexterity, so that only
     a further goal suffices; 0 where the weights decide."""
 
-    def rank(self, choice: Choice) -> tuple[float, ...]:
-        """Return a key that is greater for the better of two sets, on the grid or refined."""
+    def rank(
+        self, reachability: FloatArray, manipulability: FloatArray, members: int, value: FloatArray
+    ) -> FloatArray:
+        """Return keys by which sets of a size are compared, the first before the others, (3, n).
+
+        Args:
+            reachability: P_R of the sets, shape (n,).
+            manipulability: P_M of the sets, shape (n,).
+            members: Number of their members.
+            value: Their utility less their penalties, shape (n,).
+        """
         if self.to_gain:
-            goals = round(choice.reachability, _SAME_REACHABILITY)
-            return (goals, -float(len(choice.members)), choice.manipulability)
-        return (choice.ranked,)
+            goals = np.round(reachability, _SAME_REACHABILITY)
+            return np.stack([goals, np.full(goals.shape, -float(members)), manipulability])
+        return np.stack([value, np.zeros_like(value), np.zeros_like(value)])
 
 
 def ranking_of(

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from tcs.errors import SelectionError, UnknownNameError
 from tcs.model.grid import Grid, InitialConfiguration
-from tcs.placement.selection.distances import ROUTES, Distances
+from tcs.placement.selection.distances import ON_EDGE, ROUTES, Distances, LatticeDistances
 from tcs.placement.selection.utility import check_coordinate, check_weight, check_within_axis
 
 FloatArray = NDArray[np.float64]
@@ -132,6 +132,7 @@ def legs_from(
     cell: NDArray[np.int32],
     distances: Distances,
     weights: TravelWeights,
+    off_grid: FloatArray | None = None,
 ) -> Legs:
     """Return the legs between the current state and the candidates of a grid.
 
@@ -140,9 +141,10 @@ def legs_from(
             is not known: then only the driving between the candidates costs.
         grid: Grid of the candidates.
         candidates: Flat indices of the candidates, shape (C,).
-        cell: Their base cells, shape (C,).
+        cell: Base cells of these and of those off the grid, shape (C + M,).
         distances: Driving distances between the cells.
         weights: Cost of each type of motion.
+        off_grid: Values of the axes of further candidates [m or rad], shape (M, axes).
 
     Raises:
         UnknownNameError: If a weight names an axis that the environment does not have.
@@ -161,13 +163,19 @@ def legs_from(
     # Coordinates are looked up only if they have a weight: that takes longer than selecting.
     values = grid.values(candidates) if names else {}
     levels = [values[name] for name in names]
+    if off_grid is not None:
+        number = {axis.name: i for i, axis in enumerate(grid.axes)}
+        levels = [
+            np.concatenate([column, off_grid[:, number[name]]])
+            for name, column in zip(names, levels, strict=True)
+        ]
     reachable = np.isfinite(metres)
     return Legs(
         cell=cell,
         distances=distances,
         here_to_cell=float(weights.metre) * np.where(reachable, metres, 0.0),
         reachable=reachable,
-        levels=np.stack(levels, axis=1) if names else np.zeros((len(candidates), 0)),
+        levels=np.stack(levels, axis=1) if names else np.zeros((len(cell), 0)),
         level_weights=level_weights,
         turns=bool(names) and weights.turn > 0.0,
         here_levels=np.array([current[name] for name in names], dtype=np.float64),
@@ -197,6 +205,52 @@ def shortest_tour(from_here: Sequence[float], between: FloatArray) -> tuple[floa
         if cost < best:
             best, best_order = cost, order
     return best, best_order
+
+
+def warning_outside(
+    legs: Legs, here: InitialConfiguration, cells: tuple[int, ...], grid: Grid
+) -> str | None:
+    """Return a warning if the path around the furniture leaves the grid, else None.
+
+    Args:
+        legs: Travel from the current state, by either route; a straight path, which ignores the
+            furniture, causes no warning.
+        here: The current state.
+        cells: Base cells of the members, in the order of the tour.
+        grid: The scored grid.
+    """
+    distances = legs.distances
+    if not isinstance(distances, LatticeDistances):
+        return None
+    axes = (grid.axis("base_x"), grid.axis("base_y"))
+    low = np.array([axis.values[0] for axis in axes])
+    high = np.array([axis.values[-1] for axis in axes])
+    covered = f"x {low[0]:g} to {high[0]:g} m, y {low[1]:g} to {high[1]:g} m"
+    start = np.array([here.base_x, here.base_y])
+    if np.any((start < low - ON_EDGE) | (start > high + ON_EDGE)):
+        return (
+            f"The path around the furniture starts outside the scored grid ({covered}), where the "
+            "scores do not show what blocks the base."
+        )
+    metres = [float(legs.here_to_cell[cells[0]]) / legs.metre if legs.metre else np.inf]
+    metres += [
+        float(distances.between(np.array(one), np.array(other)))
+        for one, other in itertools.pairwise(cells)
+    ]
+    stops = np.concatenate([start[None], distances.cell_xy[list(cells)]])
+    to_edge = np.minimum(stops - low, high - stops).min(axis=1)
+    # A leg that is too short to reach the edge and return needs no search.
+    if np.all(np.array(metres) <= to_edge[:-1] + to_edge[1:]):
+        return None
+    path = distances.path(float(start[0]), float(start[1]), cells, low, high)
+    outside = np.any((path < low - ON_EDGE) | (path > high + ON_EDGE), axis=1)
+    if not np.any(outside):
+        return None
+    x, y = path[int(np.argmax(outside))]
+    return (
+        f"The path around the furniture leaves the scored grid ({covered}) at ({x:.2f}, {y:.2f}) "
+        "m; beyond it the scores do not show what blocks the base."
+    )
 
 
 def _weighted_levels(

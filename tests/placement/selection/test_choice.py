@@ -15,7 +15,7 @@ from tcs.placement.selection import (
     SelectionTables,
     TravelWeights,
     UtilityWeights,
-    search,
+    branch_and_bound,
     select,
 )
 from tcs.placement.tables import Reason, ScoreTable
@@ -114,7 +114,7 @@ place = st.one_of(st.sampled_from([-0.7, -0.5, -0.1, 0.1, 0.3]), st.floats(-3.0,
     turned=st.booleans(),
     where=st.tuples(place, place, st.floats(-7.0, 7.0), st.floats(0.0, 0.2)),
     bed_now=st.floats(0.0, 0.15),
-    first_candidates=st.sampled_from([1, 5, search.FIRST_CANDIDATES]),
+    first_candidates=st.sampled_from([1, 5, branch_and_bound.FIRST_CANDIDATES]),
     options=st.fixed_dictionaries(
         {
             "rule": st.sampled_from(["paper", "code2015"]),
@@ -122,8 +122,10 @@ place = st.one_of(st.sampled_from([-0.7, -0.5, -0.1, 0.1, 0.3]), st.floats(-3.0,
             "max_members": st.sampled_from([1, 2, 3]),
         }
     ).filter(lambda options: options["rule"] == "paper" or options["max_members"] < 3),
-    chunk=st.sampled_from([3, search.CHUNK]),
-    cells=st.sampled_from([(search.FIRST_CELLS, search.MOST_CELLS), (1, 1.0), (2, 0.5)]),
+    chunk=st.sampled_from([3, branch_and_bound.CHUNK]),
+    cells=st.sampled_from(
+        [(branch_and_bound.FIRST_CELLS, branch_and_bound.MOST_CELLS), (1, 1.0), (2, 0.5)]
+    ),
 )
 def test_equals_brute_force_over_all_kept_sets(
     seed,
@@ -166,10 +168,10 @@ def test_equals_brute_force_over_all_kept_sets(
     tables = SelectionTables(build_sets(scores, grid, min_distance=min_distance, **options), grid)
     with pytest.MonkeyPatch.context() as patch:
         # Small tables open every group in the first round, unless that is small too.
-        patch.setattr(search, "FIRST_CANDIDATES", first_candidates)
-        patch.setattr(search, "CHUNK", chunk)
-        patch.setattr(search, "FIRST_CELLS", cells[0])
-        patch.setattr(search, "MOST_CELLS", cells[1])
+        patch.setattr(branch_and_bound, "FIRST_CANDIDATES", first_candidates)
+        patch.setattr(branch_and_bound, "CHUNK", chunk)
+        patch.setattr(branch_and_bound, "FIRST_CELLS", cells[0])
+        patch.setattr(branch_and_bound, "MOST_CELLS", cells[1])
         constraints = Constraints(prefer=("base_yaw = 120 deg", "base_x <= 0")) if turned else None
         asked = {"weights": weights, "travel": travel, "constraints": constraints or Constraints()}
         choice = select(tables, here, **asked)
@@ -268,9 +270,9 @@ def test_equals_brute_force_around_the_furniture(
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("levels", [0, 2, 50], ids=["distinct", "many ties", "some ties"])
 def test_equals_brute_force_on_a_larger_table(seed, levels, monkeypatch):
-    monkeypatch.setattr(search, "FIRST_CANDIDATES", 8)
-    monkeypatch.setattr(search, "FIRST_CELLS", 1 + 3 * (seed % 2))
-    monkeypatch.setattr(search, "MOST_CELLS", 0.25 if seed > 1 else 1.0)
+    monkeypatch.setattr(branch_and_bound, "FIRST_CANDIDATES", 8)
+    monkeypatch.setattr(branch_and_bound, "FIRST_CELLS", 1 + 3 * (seed % 2))
+    monkeypatch.setattr(branch_and_bound, "MOST_CELLS", 0.25 if seed > 1 else 1.0)
     grid = small_grid(nx=12, ny=8, yaws=2, torsos=1, step=0.15)
     scores = random_scores(grid, 8, seed, levels=levels, share=0.2)
     kept = all_sets(scores, grid, 0.4)
@@ -323,17 +325,17 @@ def test_bounds_are_computed_for_the_groups_of_few_cells(monkeypatch):
     grid = small_grid(nx=12, ny=8, yaws=2, torsos=1, step=0.15)
     tables = SelectionTables(build_sets(random_scores(grid, 8, 0, share=0.2), grid), grid)
     examined = []
-    among = search._best_among
+    among = branch_and_bound._best_among
 
     def counted(bounds, *rest):
         examined.append(bounds.groups.size)
         return among(bounds, *rest)
 
-    monkeypatch.setattr(search, "_best_among", counted)
+    monkeypatch.setattr(branch_and_bound, "_best_among", counted)
     here = InitialConfiguration(base_x=0.5, base_y=0.5, base_yaw=0.0, torso=0.0)
     travel = select(tables, here, weights=UtilityWeights(travel=1.0))
     assert sum(examined) < tables.index.groups[0].cells[0].size / 2
-    monkeypatch.setattr(search, "FIRST_CELLS", tables.sets.cell_xy.shape[0])
+    monkeypatch.setattr(branch_and_bound, "FIRST_CELLS", tables.sets.cell_xy.shape[0])
     assert select(tables, here, weights=UtilityWeights(travel=1.0)).indices == travel.indices
 
 
@@ -342,15 +344,15 @@ def test_groups_of_further_cells_are_examined(members, monkeypatch):
     """The best set need not be in the groups that are examined first."""
     grid = small_grid(nx=6, ny=4, yaws=2, torsos=1, step=0.3)
     rng, found = np.random.default_rng(1), []
-    among = search._best_among
+    among = branch_and_bound._best_among
 
     def recorded(bounds, to_beat, best):
         result = among(bounds, to_beat, best)
         found.append(best is not None and result is not best)
         return result
 
-    monkeypatch.setattr(search, "_best_among", recorded)
-    monkeypatch.setattr(search, "MOST_CELLS", 1.0)
+    monkeypatch.setattr(branch_and_bound, "_best_among", recorded)
+    monkeypatch.setattr(branch_and_bound, "MOST_CELLS", 1.0)
     for seed in range(12):
         scores = random_scores(grid, 6, seed, share=0.3)
         tables = SelectionTables(build_sets(scores, grid, max_members=members), grid)
@@ -361,9 +363,9 @@ def test_groups_of_further_cells_are_examined(members, monkeypatch):
                 "weights": UtilityWeights(travel=gamma, manipulability=3.0),
                 "travel": TravelWeights(turn=0.5),
             }
-            monkeypatch.setattr(search, "FIRST_CELLS", 1)
+            monkeypatch.setattr(branch_and_bound, "FIRST_CELLS", 1)
             choice = select(tables, here, **options)
-            monkeypatch.setattr(search, "FIRST_CELLS", 10_000)
+            monkeypatch.setattr(branch_and_bound, "FIRST_CELLS", 10_000)
             assert select(tables, here, **options).indices == choice.indices
     assert any(found)
 

@@ -137,7 +137,7 @@ def test_obstacles_block_the_solutions_of_every_table(file):
     box = Obstacle.parse("0.1 0.4 0.2 0.1 20 0.5 0.8")
     constraints = Constraints(blocked=(box,))
     tables = [SelectionTables.of(file, i) for i in (2, 3, 1)]
-    admitted = admitted_candidates(constraints, HERE, tables[0])
+    admitted = admitted_candidates(constraints, HERE, tables[0], tables[0].index)
     found = admitted_at_limbs(file, match, constraints, admitted)
     # In plain loops: free in the table nearest to all, and in that of the goal's own frame.
     free = []
