@@ -46,7 +46,7 @@ def main() -> int:
         row(
             name,
             f"{len(sets.candidates)} candidates, {len(sets.cell_xy)} cells, "
-            f"{len(sets.pair_cells)} pairs of cells, {sets.sets} sets",
+            f"{len(sets.pairs.cells)} pairs of cells, {sets.sets} sets",
         )
         for what, travel in travels(tables.grid).items():
             wrong += measure(tables, f"{name}: {what}", travel, options)

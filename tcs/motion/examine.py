@@ -180,7 +180,9 @@ def worth_examining(sets: SetTable, within: float | None, most: int | None) -> N
         raise TcsError(f"within is {within:g}; must be a fraction from 0 to 1.")
     if most is not None and most < 1:
         raise TcsError(f"most is {most}; must be 1 or more configurations.")
-    best = np.maximum(sets.single_reachability + sets.single_manipulability, sets.member_sum)
+    best = np.maximum(
+        sets.single_reachability + sets.single_manipulability, sets.pairs.member_total
+    )
     if sets.triples is not None:
         best = np.maximum(best, sets.triples.member_total)
     order = np.argsort(-best, kind="stable")

@@ -21,7 +21,7 @@ from tcs.placement.robustness.statistics import CONFIDENCE, intervals_of
 from tcs.placement.robustness.trials import Errors, Progress, Trials
 from tcs.placement.store import ScoreFile, state_to_json
 from tcs.placement.tables import (
-    RefinedSuccess,
+    Estimates,
     RefinedTable,
     SetTable,
     SuccessTable,
@@ -173,9 +173,9 @@ def _surest_refined(grid: Grid, refined: RefinedTable | None) -> dict[str, Any] 
     return {
         "row": row,
         "members": [member.to_json() for member in refined.members(grid, row)],
-        "success": float(success.mean[row]),
+        "success": float(success.success[row]),
         "ci95": [float(success.low[row]), float(success.high[row])],
-        "samples": success.samples,
+        "samples": int(success.samples[row]),
         "sets": len(refined.origin),
     }
 
@@ -206,7 +206,7 @@ def success_of(
         part = {name: values[start:stop] for name, values in offsets.items()}
         return trials.reached(table.candidates[rows], part, jobs=jobs)
 
-    found: list[tuple[IntArray, Estimates]] = []
+    found: list[tuple[IntArray, HalvingEstimates]] = []
     for pool, most in ((_singles(table), -(-sets // 4)), (_pairs(table), sets)):
         contenders = _screened(trials, pool, most, seed, jobs)
         step()
@@ -236,11 +236,12 @@ def with_success(
         for row in range(len(refined.origin))
     ]
     mean, low, high = intervals_of(np.array(fractions))
-    success = RefinedSuccess(mean=mean, low=low, high=high, samples=samples)
+    every = np.full(len(mean), samples, dtype=np.int32)
+    success = Estimates(success=mean, low=low, high=high, samples=every)
     return dataclasses.replace(refined, success=success)
 
 
-def _as_table(table: SetTable, found: list[tuple[IntArray, Estimates]]) -> SuccessTable:
+def _as_table(table: SetTable, found: list[tuple[IntArray, HalvingEstimates]]) -> SuccessTable:
     """Return the estimates of sets of several sizes as one table, in order."""
     width = max((rows.shape[1] for rows, _ in found if len(rows)), default=1)
     members, columns = [], []
@@ -271,7 +272,7 @@ def _singles(table: SetTable) -> IntArray:
 
 def _pairs(table: SetTable) -> IntArray:
     """Return the contending pairs, best scores first, shape (K, 2)."""
-    greatest = float(table.pair_reachability.max(initial=0.0))
+    greatest = float(table.pairs.reachability.max(initial=0.0))
     least = EQUAL_REACHABILITY * greatest - FRACTION_TOLERANCE
     pairs = Pairs.joined(kept_pairs(table, least_reachability=least))
     if pairs.first.size < MIN_CONTENDERS:
@@ -326,7 +327,7 @@ they reach, shape (members, stop - start, goals)."""
 
 
 @dataclass(frozen=True, eq=False)
-class Estimates:
+class HalvingEstimates:
     """Estimated success of K sets, shapes (K,)."""
 
     mean: FloatArray
@@ -361,7 +362,7 @@ def successive_halving(
     samples: int,
     attempt: Attempt,
     on_round: Callable[[], None] = lambda: None,
-) -> Estimates:
+) -> HalvingEstimates:
     """Return estimates of the success of sets, with the most samples for the best of them.
 
     All sets are evaluated on the same samples, so that the variance of their differences is much
@@ -401,7 +402,7 @@ def successive_halving(
         rows = np.flatnonzero(counts == size)
         if rows.size:
             mean[rows], low[rows], high[rows] = intervals_of(fractions[rows, :size])
-    return Estimates(mean, low, high, counts, alive)
+    return HalvingEstimates(mean, low, high, counts, alive)
 
 
 def _fill(

@@ -72,11 +72,12 @@ def kept_pairs(
     if sets.max_members < 2:
         return
     margin = FRACTION_TOLERANCE
-    groups = (sets.pair_reachability >= least_reachability - margin) & (
-        sets.pair_sum >= least_sum - margin
+    pairs = sets.pairs
+    groups = (pairs.reachability >= least_reachability - margin) & (
+        pairs.total >= least_sum - margin
     )
-    feasible = (sets.member_reachability >= least_reachability - margin) & (
-        sets.member_sum >= least_sum - margin
+    feasible = (pairs.member_reachability >= least_reachability - margin) & (
+        pairs.member_total >= least_sum - margin
     )
     of_cell = [
         cell[feasible[cell]]
@@ -84,7 +85,7 @@ def kept_pairs(
     ]
     batch: list[tuple[IntArray, IntArray]] = []
     size = 0
-    for one, other in sets.pair_cells[groups]:
+    for one, other in pairs.cells[groups]:
         first = np.repeat(of_cell[one], of_cell[other].size)
         second = np.tile(of_cell[other], of_cell[one].size)
         batch.append((first, second))
@@ -155,7 +156,7 @@ def uniform_sets(
     if members == 1:
         pool = np.flatnonzero(singles >= fraction * greatest - FRACTION_TOLERANCE)[:, None]
     else:
-        greatest = max(greatest, float(sets.pair_reachability.max(initial=0.0)))
+        greatest = max(greatest, float(sets.pairs.reachability.max(initial=0.0)))
         least = fraction * greatest - FRACTION_TOLERANCE
         pairs = Pairs.joined(kept_pairs(sets, least_reachability=least))
         pool = np.stack([pairs.first, pairs.second], axis=1)

@@ -472,17 +472,11 @@ class _Query:
     def _success_of(self, rows: tuple[int, ...]) -> tuple[float, float, float] | None:
         """Return mean, lower and upper end of the success of a set; None without an estimate."""
         number, refined = self.index.refined_set(rows[0]), self.index.refined
-        if number is not None:
-            found = None if refined is None else refined.success
-            columns = None if found is None else (found.mean, found.low, found.high)
-        else:
-            known = self.tables.success
-            number = None if known is None else known.row_of(self._chosen(rows).indices)
-            columns = None if known is None else (known.success, known.low, known.high)
-        if columns is None or number is None:
-            return None
-        mean, low, high = (float(column[number]) for column in columns)
-        return mean, low, high
+        if refined is not None and number is not None:
+            return None if refined.success is None else refined.success.at(number)
+        known = self.tables.success
+        number = None if known is None else known.row_of(self._chosen(rows).indices)
+        return None if known is None or number is None else known.at(number)
 
     def _low_of(self, rows: tuple[int, ...]) -> float | None:
         """Return the lower confidence bound of the success of a set; None without an estimate."""

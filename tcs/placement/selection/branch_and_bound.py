@@ -294,6 +294,7 @@ def _is_kept(
     kept = manipulability >= index.groups.least
     if index.members == 2:
         larger = np.maximum(*(sets.single_manipulability[member] for member in members))
+        kept &= manipulability >= sets.limits.manipulability
         kept &= manipulability >= sets.limits.gain * larger
         kept &= reachability >= sets.limits.reachability
     if sets.same_environment:

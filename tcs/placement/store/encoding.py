@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,7 @@ from tcs.files.mapped import chunks, large_zeros
 from tcs.files.quantities import GOALS
 from tcs.files.reader import SCORE_FILE, explained, read_joblib
 from tcs.model.grid import Grid
+from tcs.placement.store.codec import decode_columns, decode_names, encode_columns
 from tcs.placement.store.score_file import (
     DESCRIPTIONS,
     ScoreFile,
@@ -37,15 +38,17 @@ from tcs.placement.store.score_file import (
 )
 from tcs.placement.tables import (
     BaseLattice,
+    Estimates,
     Reason,
-    RefinedSuccess,
     RefinedTable,
     ScoreTable,
     SetTable,
     SuccessTable,
 )
-from tcs.placement.tables.sets import BOUNDS, MOVES, Groups
-from tcs.placement.tables.success import NO_MEMBER
+from tcs.placement.tables.columns import ArrayTable
+from tcs.placement.tables.sets import MOVES, Groups
+
+Table = TypeVar("Table", bound=ArrayTable)
 
 FORMAT = "tcs scores"
 """Name of the format."""
@@ -67,8 +70,8 @@ def encode(file: ScoreFile) -> dict[str, Any]:
             {
                 "sets": encode_sets(table.sets),
                 "scores": _encode_scores(table.scores, table.sets),
-                "success": encode_success(table.success),
-                "refined": encode_refined(table.refined),
+                "success": None if table.success is None else encode_columns(table.success),
+                "refined": _encode_refined(table.refined),
             }
             for table in file.tables
         ],
@@ -112,8 +115,8 @@ def _decode_table(encoded: dict[str, Any], grid: Grid, path: Path | None) -> Sta
     """Return the tables of one state, whose scores are decoded on first access."""
     sets = decode_sets(_dict(encoded.get("sets"), "sets"), grid)
     scores = _dict(encoded.get("scores"), "scores")
-    success = decode_success(encoded.get("success"))
-    refined = decode_refined(encoded.get("refined"), sets.weights)
+    success = _decode_if(SuccessTable, encoded.get("success"), "estimates of success")
+    refined = _decode_refined(encoded.get("refined"), sets.weights)
     return StateTables(sets, partial(_read_scores, scores, sets, grid.size, path), success, refined)
 
 
@@ -144,24 +147,21 @@ def _encode_scores(scores: ScoreTable, sets: SetTable) -> dict[str, Any]:
                 ]
             )
         ),
-        "reason": compress(scores.reason),
         "pair_plus_one": compress(_plus_one(scores.pair)),
         "pair_names": [list(names) for names in scores.pair_names],
-        "arm_joints": compress(scores.arm_joints),
-        **({} if scores.hand is None else {"hand": compress(scores.hand)}),
+        **encode_columns(scores),
     }
 
 
 def _decode_scores(encoded: dict[str, Any], sets: SetTable, size: int) -> ScoreTable:
-    reason = decompress(encoded, "reason", "u1", (size, sets.weights.size))
+    goals = sets.weights.size
+    columns = decode_columns(
+        ScoreTable, encoded, {"H": size, "G": goals, "R": AtMost(size * goals)}
+    )
+    reason = columns["reason"]
     if len(sets.candidates) and sets.candidates[-1] >= size:
         raise StoreFormatError("has sets of more configurations than scores")
-    names = encoded.get("pair_names")
-    if not isinstance(names, list) or not all(
-        isinstance(n, list) and len(n) == 2 and all(isinstance(body, str) for body in n)
-        for n in names
-    ):
-        raise StoreFormatError("has pair_names that are not pairs of names")
+    names = decode_names(encoded)
     stored = decompress(encoded, "pair_plus_one", "u", reason.shape)
     pair: NDArray[Any] = large_zeros(reason.shape, _pair_type(len(names)))
     for rows in chunks(stored, pair):
@@ -169,15 +169,12 @@ def _decode_scores(encoded: dict[str, Any], sets: SetTable, size: int) -> ScoreT
             raise StoreFormatError(f"has a pair of bodies beyond its {len(names)} pair_names")
         pair[rows] = stored[rows]
         pair[rows] -= 1
-    reached = sum(int(np.count_nonzero(reason[rows] == Reason.REACHED)) for rows in chunks(reason))
     return ScoreTable(
+        **columns,
         dexterity=_decode_dexterity(encoded, sets, reason),
-        reason=reason,
         pair=pair,
-        pair_names=tuple((first, second) for first, second in names),
-        arm_joints=decompress(encoded, "arm_joints", "f4", (reached, 7)),
+        pair_names=names,
         weights=sets.weights,
-        hand=decompress(encoded, "hand", "u1", reason.shape) if "hand" in encoded else None,
     )
 
 
@@ -248,38 +245,37 @@ _PLAIN = {
     "state_size": int,
 }
 """Type of each field of a set table that is a single value."""
+_OF_PAIRS = {
+    "count": "pair_count",
+    "manipulability": "pair_manipulability",
+    "total": "pair_sum",
+    "member_total": "member_sum",
+}
+"""Names in files of columns of the groups of pairs that are named otherwise."""
 
 
 def encode_sets(sets: SetTable) -> dict[str, Any]:
     """Return the plain containers that `decode_sets` takes."""
-    cells = len(sets.cell_xy)
-    numbers = sets.pair_cells[:, 0].astype(np.int64) * cells + sets.pair_cells[:, 1]
+    cells, triples = len(sets.cell_xy), None
+    if sets.triples is not None:
+        triples = {
+            "least": float(sets.triples.least),
+            "step": compress(_steps(sets.triples, cells)),
+            "reachability": compress(sets.triples.reachability),
+            **encode_columns(sets.triples),
+        }
     # There are few different values: at most one for each subset of the goals.
-    values, code = np.unique(sets.pair_reachability, return_inverse=True)
+    values, code = np.unique(sets.pairs.reachability, return_inverse=True)
     return {
-        "rule": sets.rule,
-        "max_members": int(sets.max_members),
-        "min_distance": float(sets.min_distance),
-        "same_environment": bool(sets.same_environment),
-        "state_size": int(sets.state_size),
+        **{name: type_(getattr(sets, name)) for name, type_ in _PLAIN.items()},
         "tile": float(sets.tile),
-        "weights": compress(sets.weights),
-        "candidate_step": _encode_ascending(sets.candidates.astype(np.int64)),
-        "reached": compress(sets.reached.astype(np.uint8)),
+        **encode_columns(sets),
         "dexterity": compress(sets.dexterity[sets.reached]),
-        **({} if sets.hand is None else {"hand": compress(sets.hand)}),
-        "cell": compress(smallest_unsigned(sets.cell.astype(np.int64))),
-        "cell_xy": compress(sets.cell_xy),
-        "pair_step": _encode_ascending(numbers),
-        "pair_count": compress(smallest_unsigned(sets.pair_count)),
+        "pair_step": compress(_steps(sets.pairs, cells)),
+        **encode_columns(sets.pairs, _OF_PAIRS),
         "reachability_values": compress(values),
         "reachability_code": compress(smallest_unsigned(code.astype(np.int64))),
-        "pair_manipulability": compress(sets.pair_manipulability),
-        "pair_sum": compress(sets.pair_sum),
-        "member_reachability": compress(sets.member_reachability),
-        "member_manipulability": compress(sets.member_manipulability),
-        "member_sum": compress(sets.member_sum),
-        "triples": None if sets.triples is None else _encode_groups(sets.triples, cells),
+        "triples": triples,
         "best": list(sets.best),
         "best_single": list(sets.best_single),
         "lattice": {
@@ -306,78 +302,62 @@ def decode_sets(encoded: dict[str, Any], grid: Grid) -> SetTable:
     # Files from before there were such sets do not name it.
     if type(encoded.get("tile", 0.0)) is not float:
         raise StoreFormatError("lacks a valid 'tile' (float)")
-    configurations = grid.size
-    weights = decompress(encoded, "weights", "f8", (AtMost(int(GOALS.high)),))
-    candidates = ascending_from(
-        decompress(encoded, "candidate_step", "u", (AtMost(configurations),)),
-        configurations,
-        "candidates",
-    )
-    reached = decompress(encoded, "reached", "u1", (candidates.size, weights.size)) != 0
+    size = grid.size
+    lengths = {"G": AtMost(int(GOALS.high)), "C": AtMost(size), "N": AtMost(size)}
+    columns = decode_columns(SetTable, encoded, lengths, size)
+    reached, cell_xy = columns["reached"], columns["cell_xy"]
     dexterity = np.zeros(reached.shape, dtype=np.float32)
     dexterity[reached] = decompress(encoded, "dexterity", "f4", (int(np.count_nonzero(reached)),))
-    cell_xy = decompress(encoded, "cell_xy", "f8", (AtMost(candidates.size), 2))
-    values = decompress(encoded, "reachability_values", "f8", (None,))
-    step = decompress(encoded, "pair_step", "u", (AtMost(len(cell_xy) ** 2),))
-    kept = (step.size,)
-    numbers = ascending_from(step, len(cell_xy) ** 2 + 1, "pairs of cells")
-    code = decompress(encoded, "reachability_code", "u", kept)
-    if np.any(code >= values.size):
-        raise StoreFormatError(f"has a reachability code beyond its {values.size} values")
-    pair_cells = _digits(numbers, len(cell_xy), 2)
     return SetTable(
         **{name: encoded[name] for name in _PLAIN},
         tile=encoded.get("tile", 0.0),
-        weights=weights,
-        candidates=candidates.astype(np.int32),
-        reached=reached,
+        **columns,
         dexterity=dexterity,
-        hand=decompress(encoded, "hand", "u1", reached.shape) if "hand" in encoded else None,
-        cell=_int32(decompress(encoded, "cell", "u", candidates.shape)),
-        cell_xy=cell_xy,
-        pair_cells=pair_cells,
-        pair_count=decompress(encoded, "pair_count", "u", kept).astype(np.int64),
-        pair_reachability=values[code],
-        pair_manipulability=decompress(encoded, "pair_manipulability", "f4", kept),
-        pair_sum=decompress(encoded, "pair_sum", "f4", kept),
-        member_reachability=decompress(encoded, "member_reachability", "f8", candidates.shape),
-        member_manipulability=decompress(encoded, "member_manipulability", "f4", candidates.shape),
-        member_sum=decompress(encoded, "member_sum", "f4", candidates.shape),
-        triples=_decode_groups(encoded.get("triples"), len(cell_xy)),
+        pairs=_decode_pairs(encoded, len(cell_xy)),
+        triples=_decode_triples(encoded.get("triples"), len(cell_xy)),
         best=_indices(encoded, "best"),
         best_single=_indices(encoded, "best_single"),
         lattice=_decode_lattice(encoded.get("lattice")),
     )
 
 
-def _encode_groups(groups: Groups, cells: int) -> dict[str, Any]:
-    """Return the plain containers that `_decode_groups` takes."""
+def _steps(groups: Groups, cells: int) -> NDArray[Any]:
+    """Return differences of the numbers that the cells of groups are the digits of."""
     number = np.zeros(len(groups.cells), dtype=np.int64)
     for column in groups.cells.T.astype(np.int64):
         number = number * cells + column
-    return {
-        "least": float(groups.least),
-        "step": _encode_ascending(number),
-        **{name: compress(getattr(groups, name)) for name in BOUNDS},
-        "count": compress(smallest_unsigned(groups.count)),
-    }
+    return smallest_unsigned(differences(number))
 
 
-def _decode_groups(encoded: object, cells: int) -> Groups | None:
-    """Return the encoded sets of three, checked; None where there are none."""
+def _decode_pairs(encoded: dict[str, Any], cells: int) -> Groups:
+    """Return the encoded sets of two."""
+    values = decompress(encoded, "reachability_values", "f8", (None,))
+    step = decompress(encoded, "pair_step", "u", (AtMost(cells**2),))
+    code = decompress(encoded, "reachability_code", "u", step.shape)
+    if np.any(code >= values.size):
+        raise StoreFormatError(f"has a reachability code beyond its {values.size} values")
+    columns = decode_columns(Groups, encoded, {"K": step.size}, keys=_OF_PAIRS)
+    return Groups(**columns, cells=_cells(step, cells, 2), reachability=values[code])
+
+
+def _decode_triples(encoded: object, cells: int) -> Groups | None:
+    """Return the encoded sets of three; None where there are none."""
     if encoded is None:
         return None
     if not isinstance(encoded, dict) or type(encoded.get("least")) is not float:
         raise StoreFormatError("has invalid sets of three")
-    steps = decompress(encoded, "step", "u", (None,))
-    number = ascending_from(steps, cells**3 + 1, "triples of cells")
-    wide = {"reachability": "f8", "member_reachability": "f8"}
+    step = decompress(encoded, "step", "u", (None,))
     return Groups(
+        **decode_columns(Groups, encoded, {"K": step.size}),
+        cells=_cells(step, cells, 3),
+        reachability=decompress(encoded, "reachability", "f8", step.shape),
         least=encoded["least"],
-        cells=_digits(number, cells, 3),
-        count=decompress(encoded, "count", "u", number.shape).astype(np.int64),
-        **{name: decompress(encoded, name, wide.get(name, "f4"), (None,)) for name in BOUNDS},
     )
+
+
+def _cells(steps: NDArray[Any], cells: int, members: int) -> NDArray[np.int32]:
+    """Return the cells of groups of which `_steps` are given."""
+    return _digits(ascending_from(steps, cells**members + 1, "groups of cells"), cells, members)
 
 
 def _digits(numbers: NDArray[np.int64], base: int, count: int) -> NDArray[np.int32]:
@@ -424,79 +404,21 @@ def _indices(encoded: dict[str, Any], name: str) -> tuple[int, ...]:
     return tuple(members)
 
 
-def _int32(values: NDArray[Any]) -> NDArray[np.int32]:
-    if np.any(values > np.iinfo(np.int32).max):
-        raise StoreFormatError("has a number of a cell that is out of range")
-    return values.astype(np.int32)
-
-
-def _encode_ascending(numbers: NDArray[np.int64]) -> dict[str, Any]:
-    return compress(smallest_unsigned(differences(numbers)))
-
-
-def encode_success(success: SuccessTable | None) -> dict[str, Any] | None:
-    """Return the plain containers that `decode_success` takes; None where there is nothing."""
-    if success is None:
-        return None
-    return {
-        "members_plus_one": compress(
-            smallest_unsigned(success.members.astype(np.int64) - NO_MEMBER)
-        ),
-        "success": compress(success.success),
-        "low": compress(success.low),
-        "high": compress(success.high),
-        "samples": compress(smallest_unsigned(success.samples.astype(np.int64))),
-    }
-
-
-def decode_success(encoded: object) -> SuccessTable | None:
-    """Return the encoded estimates; None for a file without estimates.
-
-    Raises:
-        StoreFormatError: If something is missing or out of range.
-        TcsError: If they contradict themselves.
-    """
-    if encoded is None:
-        return None
-    if not isinstance(encoded, dict):
-        raise StoreFormatError("has invalid estimates of success")
-    members = decompress(encoded, "members_plus_one", "u", (None, None))
-    rows = (len(members),)
-    samples = decompress(encoded, "samples", "u", rows)
-    for numbers in (members, samples):
-        if np.any(numbers >= np.iinfo(np.int32).max):
-            raise StoreFormatError("has estimates of success out of range")
-    return SuccessTable(
-        members=(members.astype(np.int64) + NO_MEMBER).astype(np.int32),
-        success=decompress(encoded, "success", "f8", rows),
-        low=decompress(encoded, "low", "f8", rows),
-        high=decompress(encoded, "high", "f8", rows),
-        samples=samples.astype(np.int32),
-    )
-
-
-def encode_refined(refined: RefinedTable | None) -> dict[str, Any] | None:
-    """Return the plain containers that `decode_refined` takes; None where there is nothing."""
-    if refined is None:
-        return None
-    return {
-        "origin_plus_one": compress(smallest_unsigned(refined.origin.astype(np.int64) - NO_MEMBER)),
-        "values": compress(refined.values),
-        "reached": compress(refined.reached.astype(np.uint8)),
-        "dexterity": compress(refined.dexterity),
-        "arm_joints": compress(refined.arm_joints),
-        **({} if refined.hand is None else {"hand": compress(refined.hand)}),
-        "objective": compress(refined.objective),
-        "success": None if refined.success is None else _encode_success(refined.success),
-    }
-
-
-def decode_refined(encoded: object, weights: np.ndarray[Any, Any]) -> RefinedTable | None:
-    """Return the encoded refined sets; None for a file without them.
+def _decode_if(
+    table: type[Table],
+    encoded: object,
+    what: str,
+    lengths: dict[str, int] | None = None,
+    **others: Any,
+) -> Table | None:
+    """Return a table that is stored as its columns alone; None where there is none.
 
     Args:
-        encoded: What `encode_refined` returned.
-        weights: Weights of the goals, sum 1, shape (G,).
+        table: Its class.
+        encoded: What `encode_columns` returned, or None.
+        what: Name of the table in an error message.
+        lengths: Lengths that are known, as for `decode_columns`.
+        **others: Fields that are not stored in it.
 
     Raises:
         StoreFormatError: If something is missing or out of range.
@@ -505,38 +427,36 @@ def decode_refined(encoded: object, weights: np.ndarray[Any, Any]) -> RefinedTab
     if encoded is None:
         return None
     if not isinstance(encoded, dict):
-        raise StoreFormatError("has invalid refined sets")
-    origin = decompress(encoded, "origin_plus_one", "u", (None, None))
-    if np.any(origin >= np.iinfo(np.int32).max):
-        raise StoreFormatError("has refined sets out of range")
-    shape = (*origin.shape, weights.size)
-    return RefinedTable(
-        origin=(origin.astype(np.int64) + NO_MEMBER).astype(np.int32),
-        values=decompress(encoded, "values", "f8", (*origin.shape, None)),
-        reached=decompress(encoded, "reached", "u1", shape).astype(np.bool_),
-        dexterity=decompress(encoded, "dexterity", "f4", shape),
-        arm_joints=decompress(encoded, "arm_joints", "f4", (*shape, 7)),
-        objective=decompress(encoded, "objective", "f8", origin.shape[:1]),
-        weights=weights,
-        success=_decode_success(encoded.get("success"), origin.shape[:1]),
-        hand=decompress(encoded, "hand", "u1", shape) if "hand" in encoded else None,
-    )
+        raise StoreFormatError(f"has invalid {what}")
+    return table(**decode_columns(table, encoded, lengths), **others)
 
 
-def _encode_success(success: RefinedSuccess) -> dict[str, Any]:
-    """Return the plain containers that `_decode_success` takes."""
-    arrays = {"mean": success.mean, "low": success.low, "high": success.high}
-    return {**{name: compress(array) for name, array in arrays.items()}, "samples": success.samples}
-
-
-def _decode_success(encoded: object, shape: tuple[int, ...]) -> RefinedSuccess | None:
-    """Return the encoded success of refined sets; None without one."""
-    if encoded is None:
+def _encode_refined(refined: RefinedTable | None) -> dict[str, Any] | None:
+    if refined is None:
         return None
-    if not isinstance(encoded, dict) or type(encoded.get("samples")) is not int:
-        raise StoreFormatError("has an invalid success of its refined sets")
-    mean, low, high = (decompress(encoded, name, "f8", shape) for name in ("mean", "low", "high"))
-    return RefinedSuccess(mean=mean, low=low, high=high, samples=encoded["samples"])
+    success = refined.success
+    return {
+        **encode_columns(refined),
+        "success": None if success is None else encode_columns(success),
+    }
+
+
+def _decode_refined(encoded: object, weights: NDArray[np.float64]) -> RefinedTable | None:
+    """Return the encoded refined sets; None for a file without them."""
+    success = encoded.get("success") if isinstance(encoded, dict) else None
+    if isinstance(success, dict) and type(success.get("samples")) is int:
+        # Files from before had one number of samples, and the mean under another name.
+        mean = decompress(success, "mean", "f8", (None,))
+        samples = np.full(mean.shape, max(0, min(success["samples"], 2**31 - 1)), np.uint32)
+        success = {**success, "success": success["mean"], "samples": compress(samples)}
+    return _decode_if(
+        RefinedTable,
+        encoded,
+        "refined sets",
+        {"G": weights.size},
+        weights=weights,
+        success=_decode_if(Estimates, success, "success of its refined sets"),
+    )
 
 
 def save_scores(path: str | os.PathLike[str], file: ScoreFile) -> None:

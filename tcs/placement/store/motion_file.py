@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from tcs.errors import StoreError, StoreFormatError, StoreMismatchError
-from tcs.files.compression import ascending_from, compress, decompress, differences
 from tcs.files.joblib_file import JoblibFormat, check_types
 from tcs.files.plain import plain
 from tcs.model.grid import Grid
+from tcs.placement.store.codec import decode_columns, decode_names, encode_columns
 from tcs.placement.store.score_file import ScoreFile
 from tcs.placement.tables.motions import MotionTable
 
@@ -109,17 +109,6 @@ def motions_of(file: ScoreFile, path: str | os.PathLike[str]) -> MotionFile:
     return motions
 
 
-def _encode(table: MotionTable) -> dict[str, Any]:
-    return {
-        "configuration_step": compress(
-            differences(table.configurations.astype(np.int64)).astype(np.uint32)
-        ),
-        "outcome": compress(table.outcome),
-        "pair_plus_one": compress((table.pair + 1).astype(np.uint32)),
-        "pair_names": [list(names) for names in table.pair_names],
-    }
-
-
 def _decode_file(content: dict[str, Any]) -> MotionFile:
     check_types(content, {"metadata": dict, "tables": list})
     metadata = plain("metadata", content["metadata"])
@@ -127,26 +116,13 @@ def _decode_file(content: dict[str, Any]) -> MotionFile:
     return MotionFile(metadata=metadata, tables=tuple(map(_decode, content["tables"])))
 
 
+def _encode(table: MotionTable) -> dict[str, Any]:
+    return {**encode_columns(table), "pair_names": [list(names) for names in table.pair_names]}
+
+
 def _decode(encoded: object) -> MotionTable | None:
     if encoded is None:
         return None
     if not isinstance(encoded, dict):
         raise StoreFormatError("has invalid tables")
-    names = encoded.get("pair_names")
-    if not isinstance(names, list) or not all(
-        isinstance(pair, list) and len(pair) == 2 and all(isinstance(n, str) for n in pair)
-        for pair in names
-    ):
-        raise StoreFormatError("lacks valid 'pair_names'")
-    steps = decompress(encoded, "configuration_step", "u4", (None,))
-    configurations = ascending_from(steps, np.iinfo(np.int32).max, "configurations")
-    outcome = decompress(encoded, "outcome", "u1", (len(configurations), None))
-    pair = decompress(encoded, "pair_plus_one", "u4", outcome.shape)
-    if np.any(pair > len(names)):
-        raise StoreFormatError("has pairs of bodies that do not exist")
-    return MotionTable(
-        configurations=configurations.astype(np.int32),
-        outcome=outcome,
-        pair=pair.astype(np.int32) - np.int32(1),
-        pair_names=tuple((first, second) for first, second in names),
-    )
+    return MotionTable(**decode_columns(MotionTable, encoded), pair_names=decode_names(encoded))

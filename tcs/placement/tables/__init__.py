@@ -8,18 +8,18 @@ from __future__ import annotations
 
 from tcs.placement.tables.equations import tc_manipulability, tc_reachability
 from tcs.placement.tables.motions import MotionOutcome, MotionTable
-from tcs.placement.tables.refined import RefinedSet, RefinedSuccess, RefinedTable
+from tcs.placement.tables.refined import RefinedSet, RefinedTable
 from tcs.placement.tables.scores import Reason, ScoreTable
 from tcs.placement.tables.sets import BaseLattice, SetTable
-from tcs.placement.tables.success import SuccessTable
+from tcs.placement.tables.success import Estimates, SuccessTable
 
 __all__ = [
     "BaseLattice",
+    "Estimates",
     "MotionOutcome",
     "MotionTable",
     "Reason",
     "RefinedSet",
-    "RefinedSuccess",
     "RefinedTable",
     "ScoreTable",
     "SetTable",

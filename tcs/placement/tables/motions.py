@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.placement.tables.checks import ArrayTable, Shapes, length_of, require
+from tcs.placement.tables.columns import ArrayTable, Column, Columns, Form, require
 
 
 class MotionOutcome(IntEnum):
@@ -41,20 +42,20 @@ class MotionTable(ArrayTable):
     pair_names: tuple[tuple[str, str], ...]
     """Names of two bodies in contact."""
 
+    WHAT = "motion table"
+    COLUMNS: ClassVar[Columns] = {
+        "configurations": Column(np.int32, "n", Form.STEPS, key="configuration_step"),
+        "outcome": Column(np.uint8, "n G"),
+        "pair": Column(np.int32, "n G", Form.PLUS_ONE),
+    }
+
     def __post_init__(self) -> None:
         """Check the arrays against each other and make them read-only.
 
         Raises:
             TcsError: If an array has the wrong type, shape or range.
         """
-        count = length_of(self.configurations)
-        goals = self.outcome.shape[1] if np.ndim(self.outcome) == 2 else None
-        shapes: Shapes = {
-            "configurations": (np.int32, (count,)),
-            "outcome": (np.uint8, (count, goals)),
-            "pair": (np.int32, (count, goals)),
-        }
-        self._check_arrays("motion table", shapes)
+        self._check_arrays()
         ascending = bool(np.all(np.diff(self.configurations) > 0))
         require(
             ascending and bool(np.all(self.configurations >= 0)),

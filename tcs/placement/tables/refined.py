@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tcs.model.grid import Grid, InitialConfiguration
-from tcs.placement.tables.checks import ArrayTable, Shapes, length_of, require
+from tcs.placement.tables.columns import ArrayTable, Column, Columns, Form, require
 from tcs.placement.tables.equations import tc_manipulability, tc_reachability
 from tcs.placement.tables.scores import WEIGHT_SUM_TOLERANCE
 from tcs.placement.tables.sets import MOST_MEMBERS
-from tcs.placement.tables.success import NO_MEMBER
+from tcs.placement.tables.success import NO_MEMBER, Estimates
 
 
 class RefinedSet(NamedTuple):
@@ -25,34 +25,6 @@ class RefinedSet(NamedTuple):
     """Number of the set."""
     order: tuple[int, ...]
     """Numbers of the members, in the order of the visits."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class RefinedSuccess(ArrayTable):
-    """Estimated success of K refined sets under error, in the samples of the table's estimates."""
-
-    mean: NDArray[np.float64]
-    """Mean over the samples, shape (K,)."""
-    low: NDArray[np.float64]
-    """Lower end of the 95 % interval of the mean, shape (K,)."""
-    high: NDArray[np.float64]
-    """Upper end, shape (K,)."""
-    samples: int
-    """Number of samples."""
-
-    def __post_init__(self) -> None:
-        """Check the arrays against each other and make them read-only.
-
-        Raises:
-            TcsError: If an array has the wrong type, shape or range.
-        """
-        count = length_of(self.mean)
-        names = ("mean", "low", "high")
-        self._check_arrays("refined success", {name: (np.float64, (count,)) for name in names})
-        inside = (self.low >= 0.0) & (self.low <= self.mean)
-        inside &= (self.mean <= self.high) & (self.high <= 1.0)
-        require(bool(np.all(inside)), "refined success: 0 <= low <= mean <= high <= 1 must hold.")
-        require(self.samples > 0, "refined success: samples must be positive.")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -77,10 +49,22 @@ class RefinedTable(ArrayTable):
     """Value of the objective that was maximised, shape (K,)."""
     weights: NDArray[np.float64]
     """Weights of the goals, sum 1, shape (G,)."""
-    success: RefinedSuccess | None = None
+    success: Estimates | None = None
     """Their success under error; None unless that of the table's sets was estimated."""
     hand: NDArray[np.uint8] | None = None
     """Number of the hand of each posture, shape (K, m, G); None if there is only one."""
+
+    WHAT = "refined table"
+    COLUMNS: ClassVar[Columns] = {
+        "origin": Column(np.int32, "K m", Form.PLUS_ONE),
+        "values": Column(np.float64, "K m axes", finite=True),
+        "reached": Column(np.bool_, "K m G", Form.FLAGS),
+        "dexterity": Column(np.float32, "K m G", least=0.0),
+        "arm_joints": Column(np.float32, "K m G 7", finite=True),
+        "objective": Column(np.float64, "K", finite=True),
+        "weights": Column(np.float64, "G", Form.APART, least=0.0),
+        "hand": Column(np.uint8, "K m G", optional=True),
+    }
 
     def __post_init__(self) -> None:
         """Check the arrays against each other and make them read-only.
@@ -88,19 +72,7 @@ class RefinedTable(ArrayTable):
         Raises:
             TcsError: If an array has the wrong type, shape or range.
         """
-        count, goals = length_of(self.origin), length_of(self.weights)
-        width = self.origin.shape[1] if getattr(self.origin, "ndim", 0) == 2 else None
-        shapes: Shapes = {
-            "origin": (np.int32, (count, None)),
-            "values": (np.float64, (count, width, None)),
-            "reached": (np.bool_, (count, width, goals)),
-            "dexterity": (np.float32, (count, width, goals)),
-            "arm_joints": (np.float32, (count, width, goals, 7)),
-            "objective": (np.float64, (count,)),
-            "weights": (np.float64, (goals,)),
-            **({} if self.hand is None else {"hand": (np.uint8, (count, width, goals))}),
-        }
-        self._check_arrays("refined table", shapes)
+        self._check_arrays()
         is_member = self.origin != NO_MEMBER
         require(
             1 <= self.origin.shape[1] <= MOST_MEMBERS
@@ -108,22 +80,16 @@ class RefinedTable(ArrayTable):
             and bool(np.all(is_member[:, :-1] | ~is_member[:, 1:])),
             f"refined table: sets must have 1 to {MOST_MEMBERS} members.",
         )
-        numbers = (self.values, self.dexterity, self.arm_joints, self.objective, self.weights)
-        require(all(bool(np.all(np.isfinite(n))) for n in numbers), "refined table: not finite.")
         require(
-            bool(np.all(self.dexterity >= 0.0))
-            and not np.any(self.dexterity[~self.reached])
-            and not np.any(self.reached[~is_member]),
-            "refined table: dexterity must be 0 or more, and 0 where a goal is not reached.",
+            not np.any(self.dexterity[~self.reached]) and not np.any(self.reached[~is_member]),
+            "refined table: dexterity must be 0 where a goal is not reached.",
         )
         require(
-            bool(np.all(self.weights >= 0.0))
-            and abs(float(self.weights.sum()) - 1.0) <= WEIGHT_SUM_TOLERANCE,
+            abs(float(self.weights.sum()) - 1.0) <= WEIGHT_SUM_TOLERANCE,
             "refined table: weights must be >= 0 and sum to 1.",
         )
-
         require(
-            self.success is None or len(self.success.mean) == count,
+            self.success is None or len(self.success.low) == len(self.origin),
             "refined table: there must be one success for each set.",
         )
 

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
 
 from tcs.files.mapped import chunks, large_zeros
-from tcs.placement.tables.checks import ArrayTable, Shapes, length_of, require
+from tcs.placement.tables.columns import ArrayTable, Column, Columns, Form, require
 from tcs.placement.tables.equations import tc_manipulability, tc_reachability
 
 WEIGHT_SUM_TOLERANCE = 1e-9
@@ -73,23 +73,23 @@ class ScoreTable(ArrayTable):
     """Number of the hand that reaches the goal, or comes nearest to it, shape (H, G); None if there
     is only one."""
 
+    WHAT = "score table"
+    COLUMNS: ClassVar[Columns] = {
+        "weights": Column(np.float64, "G", Form.APART),
+        "dexterity": Column(np.float32, "H G", Form.APART),
+        "reason": Column(np.uint8, "H G"),
+        "pair": Column((np.int16, np.int32), "H G", Form.APART),
+        "arm_joints": Column(np.float32, "R 7", finite=True),
+        "hand": Column(np.uint8, "H G", optional=True),
+    }
+
     def __post_init__(self) -> None:
         """Check the arrays against each other and make them read-only.
 
         Raises:
             TcsError: If an array has the wrong type, shape or range.
         """
-        goals = length_of(self.weights)
-        rows = length_of(self.dexterity)
-        shapes: Shapes = {
-            "weights": (np.float64, (goals,)),
-            "dexterity": (np.float32, (rows, goals)),
-            "reason": (np.uint8, (rows, goals)),
-            "pair": (_pair_type(self.pair), (rows, goals)),
-            "arm_joints": (np.float32, (None, 7)),
-            **({} if self.hand is None else {"hand": (np.uint8, (rows, goals))}),
-        }
-        self._check_arrays("score table", shapes)
+        self._check_arrays()
         self._check_ranges()
 
     def _check_ranges(self) -> None:
@@ -108,7 +108,6 @@ class ScoreTable(ArrayTable):
             f"score table: {len(self.arm_joints)} rows of arm joints for "
             f"{np.count_nonzero(reached)} reached pairs; the numbers must be equal.",
         )
-        require(bool(np.all(np.isfinite(self.arm_joints))), "score table: arm joints not finite.")
 
     def _check_rows(self, rows: slice) -> None:
         """Check the ranges of the values of some configurations."""
@@ -209,8 +208,3 @@ class ScoreTable(ArrayTable):
             return None
         row = int(np.searchsorted(self._reached_pairs, h * self.goals + g))
         return np.asarray(self.arm_joints[row])
-
-
-def _pair_type(pair: object) -> DTypeLike:
-    """Return the type that the numbers of pairs of bodies must have: 16 bits, or 32 if they do."""
-    return np.int32 if getattr(pair, "dtype", None) == np.int32 else np.int16

@@ -9,14 +9,15 @@ because the score of a pair follows from the dexterity of its two members.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import UnknownNameError
-from tcs.placement.tables.checks import ArrayTable, Shapes, length_of, require
+from tcs.placement.tables.columns import ArrayTable, Column, Columns, Form, require
 from tcs.placement.tables.equations import tc_manipulability, tc_reachability
 
 MOVES = ((1, 0), (0, 1), (1, 1), (1, -1))
@@ -37,6 +38,9 @@ class BaseLattice(ArrayTable):
     moves: NDArray[np.bool_]
     """Whether the base can move from position (i, j) by each of `MOVES`, shape (4, X, Y)."""
 
+    WHAT = "base lattice"
+    COLUMNS: ClassVar[Columns] = {"moves": Column(np.bool_, f"{len(MOVES)} X Y", Form.APART)}
+
     def __post_init__(self) -> None:
         """Check the lattice and make its array read-only.
 
@@ -44,7 +48,7 @@ class BaseLattice(ArrayTable):
             TcsError: If a number is not finite, a step not positive, there are fewer than two
                 positions along an axis, or a move leaves the lattice.
         """
-        self._check_arrays("base lattice", {"moves": (np.bool_, (len(MOVES), None, None))})
+        self._check_arrays()
         numbers = (*self.start, *self.step)
         require(
             len(self.start) == len(self.step) == 2
@@ -71,8 +75,8 @@ class Groups(ArrayTable):
     The score of any set follows from its members, so a group holds bounds only.
     """
 
-    least: float
-    """Least P_M of a kept set."""
+    least: float = 0.0
+    """Least P_M of a kept set of three; that of a pair follows from the rule: `SetTable.limits`."""
     cells: NDArray[np.int32]
     """Cells of the members, ascending, with at least one kept set; lexicographic, shape (K, m)."""
     count: NDArray[np.int64]
@@ -90,27 +94,25 @@ class Groups(ArrayTable):
     member_total: NDArray[np.float32]
     """Greatest P_R + P_M of those sets, rounded upward, shape (C,)."""
 
+    WHAT = "groups of sets"
+    COLUMNS: ClassVar[Columns] = {
+        "cells": Column(np.int32, "K m", Form.APART),
+        "count": Column(np.int64, "K", Form.SMALLEST),
+        "reachability": Column(np.float64, "K", Form.APART, least=0.0),
+        "manipulability": Column(np.float32, "K", least=0.0),
+        "total": Column(np.float32, "K", least=0.0),
+        "member_reachability": Column(np.float64, "C", least=0.0),
+        "member_manipulability": Column(np.float32, "C", least=0.0),
+        "member_total": Column(np.float32, "C", least=0.0),
+    }
+
     def __post_init__(self) -> None:
         """Check the arrays against each other and make them read-only.
 
         Raises:
             TcsError: If an array has the wrong type, shape or range.
         """
-        kept, members = length_of(self.cells), length_of(self.member_reachability)
-        bounds = {"reachability": np.float64, "manipulability": np.float32, "total": np.float32}
-        shapes: Shapes = {
-            "cells": (np.int32, (kept, None)),
-            "count": (np.int64, (kept,)),
-            **{name: (dtype, (kept,)) for name, dtype in bounds.items()},
-            **{f"member_{name}": (dtype, (members,)) for name, dtype in bounds.items()},
-        }
-        self._check_arrays("groups of sets", shapes)
-        for name in BOUNDS:
-            bound = getattr(self, name)
-            require(
-                bool(np.all((bound >= 0.0) & (bound < np.inf))),
-                f"groups of sets: {name} must be finite and >= 0.",
-            )
+        self._check_arrays()
         require(0.0 <= self.least < np.inf, "groups of sets: least must be finite and >= 0.")
 
     def check(self, size: NDArray[np.int64]) -> None:
@@ -147,11 +149,6 @@ class Groups(ArrayTable):
     def kept(self) -> int:
         """Number of kept sets."""
         return int(self.count.sum())
-
-
-_NOT_BOUNDS = ("least", "cells", "count")
-BOUNDS = tuple(field.name for field in fields(Groups) if field.name not in _NOT_BOUNDS)
-"""Names of the arrays that bound scores."""
 
 
 RULES = ("paper", "code2015")
@@ -255,12 +252,6 @@ def spaced_places(rule: str, xy: NDArray[np.float64]) -> NDArray[np.float64]:
 MOST_MEMBERS = 3
 """Greatest number of members of a set."""
 
-_BOUNDS = tuple(
-    f"{of}_{what}"
-    for of in ("pair", "member")
-    for what in ("reachability", "manipulability", "sum")
-)
-
 DISTANCE_TOLERANCE = 1e-9
 """Tolerance of distances [m]. Grid steps such as 0.05 are not binary fractions: 8 of them can be
 1e-16 short of 0.40 m, or 1e-15 far from the origin."""
@@ -303,22 +294,8 @@ class SetTable(ArrayTable):
     """Base cell of each candidate, shape (C,)."""
     cell_xy: NDArray[np.float64]
     """x and y of each base cell in W [m], shape (N, 2)."""
-    pair_cells: NDArray[np.int32]
-    """Two cells, first <= second, with at least one kept pair; lexicographic, shape (K, 2)."""
-    pair_count: NDArray[np.int64]
-    """Number of kept pairs between the two cells, shape (K,)."""
-    pair_reachability: NDArray[np.float64]
-    """Greatest P_R of those pairs, exact, shape (K,)."""
-    pair_manipulability: NDArray[np.float32]
-    """Greatest P_M of those pairs, rounded upward, shape (K,)."""
-    pair_sum: NDArray[np.float32]
-    """Greatest P_R + P_M of those pairs, rounded upward, shape (K,)."""
-    member_reachability: NDArray[np.float64]
-    """Greatest P_R of the kept pairs that a candidate is in, exact, 0 if in none, shape (C,)."""
-    member_manipulability: NDArray[np.float32]
-    """Greatest P_M of those pairs, rounded upward, shape (C,)."""
-    member_sum: NDArray[np.float32]
-    """Greatest P_R + P_M of those pairs, rounded upward, shape (C,)."""
+    pairs: Groups
+    """Kept sets of two."""
     triples: Groups | None
     """Kept sets of three; None if `max_members` is less."""
     best: tuple[int, ...]
@@ -332,33 +309,24 @@ class SetTable(ArrayTable):
     """Side of the squares of the floor within which a candidate stands for others [m]; 0 if every
     configuration that the rule keeps is a candidate."""
 
+    WHAT = "set table"
+    COLUMNS: ClassVar[Columns] = {
+        "weights": Column(np.float64, "G"),
+        "candidates": Column(np.int32, "C", Form.STEPS, key="candidate_step"),
+        "reached": Column(np.bool_, "C G", Form.FLAGS),
+        "dexterity": Column(np.float32, "C G", Form.APART),
+        "hand": Column(np.uint8, "C G", optional=True),
+        "cell": Column(np.int32, "C", Form.SMALLEST),
+        "cell_xy": Column(np.float64, "N 2", finite=True),
+    }
+
     def __post_init__(self) -> None:
         """Check the arrays against each other and make them read-only.
 
         Raises:
             TcsError: If an array has the wrong type, shape or range.
         """
-        count = length_of(self.candidates)
-        goals = length_of(self.weights)
-        kept = length_of(self.pair_cells)
-        shapes: Shapes = {
-            "weights": (np.float64, (goals,)),
-            "candidates": (np.int32, (count,)),
-            "reached": (np.bool_, (count, goals)),
-            "dexterity": (np.float32, (count, goals)),
-            "cell": (np.int32, (count,)),
-            "cell_xy": (np.float64, (None, 2)),
-            "pair_cells": (np.int32, (kept, 2)),
-            "pair_count": (np.int64, (kept,)),
-            "pair_reachability": (np.float64, (kept,)),
-            "pair_manipulability": (np.float32, (kept,)),
-            "pair_sum": (np.float32, (kept,)),
-            "member_reachability": (np.float64, (count,)),
-            "member_manipulability": (np.float32, (count,)),
-            "member_sum": (np.float32, (count,)),
-            **({} if self.hand is None else {"hand": (np.uint8, (count, goals))}),
-        }
-        self._check_arrays("set table", shapes)
+        self._check_arrays()
         require(
             self.rule in RULES, f"set table: unknown rule '{self.rule}'. Known: {', '.join(RULES)}."
         )
@@ -371,7 +339,11 @@ class SetTable(ArrayTable):
         require(self.state_size > 0, "set table: state_size must be positive.")
         require(isinstance(self.lattice, BaseLattice), "set table: lattice must be a BaseLattice.")
         self._check_candidates()
-        self._check_pairs()
+        require(
+            isinstance(self.pairs, Groups) and self.pairs.cells.shape[1] == 2,
+            "set table: pairs must be groups of two.",
+        )
+        self.pairs.check(np.diff(self.cell_start))
         require(
             isinstance(self.triples, Groups) and self.triples.cells.shape[1] == MOST_MEMBERS
             if self.max_members == MOST_MEMBERS
@@ -390,7 +362,6 @@ class SetTable(ArrayTable):
             f"set table: cell outside 0..{len(self.cell_xy) - 1}.",
         )
         require(bool(np.all(np.diff(self.cell_start) > 0)), "set table: a cell has no candidate.")
-        require(bool(np.all(np.isfinite(self.cell_xy))), "set table: cell_xy must be finite.")
         along = (self.cell_xy - self.lattice.start) / self.lattice.step
         inside = (np.rint(along) >= 0) & (np.rint(along) < self.lattice.shape)
         # A millionth of a step is far above the rounding of some dozen steps.
@@ -408,31 +379,10 @@ class SetTable(ArrayTable):
                 f"set table: {name} must name one to {size} candidates.",
             )
 
-    def _check_pairs(self) -> None:
-        """Check the order and range of the pairs of cells and of their bounds."""
-        first, second = self.pair_cells.T.astype(np.int64)
-        cells = len(self.cell_xy)
-        require(
-            bool(np.all((first >= 0) & (first <= second) & (second < cells)))
-            and bool(np.all(np.diff(first * cells + second) > 0)),
-            f"set table: pair_cells must be ascending, first <= second, within 0..{cells - 1}.",
-        )
-        size = np.diff(self.cell_start)
-        require(
-            bool(np.all((self.pair_count > 0) & (self.pair_count <= size[first] * size[second]))),
-            "set table: pair_count does not fit the number of candidates in its cells.",
-        )
-        for name in _BOUNDS:
-            bound = getattr(self, name)
-            require(
-                bool(np.all((bound >= 0.0) & (bound < np.inf))),
-                f"set table: {name} must be finite and >= 0.",
-            )
-
     @property
     def kept_pairs(self) -> int:
         """Number of sets of two."""
-        return int(self.pair_count.sum())
+        return self.pairs.kept
 
     @property
     def sets(self) -> int:
@@ -454,21 +404,6 @@ class SetTable(ArrayTable):
     def limits(self) -> PairLimits:
         """The least scores of a kept pair."""
         return pair_limits(self.rule, self.single_reachability, self.single_manipulability)
-
-    @cached_property
-    def pairs(self) -> Groups:
-        """The kept sets of two."""
-        return Groups(
-            least=self.limits.manipulability,
-            cells=self.pair_cells,
-            count=self.pair_count,
-            reachability=self.pair_reachability,
-            manipulability=self.pair_manipulability,
-            total=self.pair_sum,
-            member_reachability=self.member_reachability,
-            member_manipulability=self.member_manipulability,
-            member_total=self.member_sum,
-        )
 
     @cached_property
     def state(self) -> NDArray[np.int64]:

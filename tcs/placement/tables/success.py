@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.placement.tables.checks import ArrayTable, Shapes, length_of, require
+from tcs.placement.tables.columns import ArrayTable, Column, Columns, Form, require
 from tcs.placement.tables.sets import MOST_MEMBERS, SetTable
 
 NO_MEMBER = -1
@@ -15,19 +16,14 @@ NO_MEMBER = -1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SuccessTable(ArrayTable):
+class Estimates(ArrayTable):
     """Estimated success of K sets under error; read-only.
 
     The success of a set is the probability that a goal, drawn by its weight, is reached by any
     member in a randomly perturbed environment: the mean of P_R under error, as in Table I of the
     TCS paper.
-
-    Order of the sets: singles by configuration index, then pairs in lexicographic order, then
-    triples, as in `SetTable`.
     """
 
-    members: NDArray[np.int32]
-    """Flat configuration indices, ascending, NO_MEMBER after the last, shape (K, m)."""
     success: NDArray[np.float64]
     """Mean over the samples, shape (K,)."""
     low: NDArray[np.float64]
@@ -37,30 +33,58 @@ class SuccessTable(ArrayTable):
     samples: NDArray[np.int32]
     """Number of samples of the mean, shape (K,)."""
 
+    WHAT = "estimates of success"
+    COLUMNS: ClassVar[Columns] = {
+        **dict.fromkeys(("success", "low", "high"), Column(np.float64, "K")),
+        "samples": Column(np.int32, "K", Form.SMALLEST),
+    }
+
     def __post_init__(self) -> None:
         """Check the arrays against each other and make them read-only.
 
         Raises:
             TcsError: If an array has the wrong type, shape or range.
         """
-        count = length_of(self.members)
-        shapes: Shapes = {
-            "members": (np.int32, (count, None)),
-            "success": (np.float64, (count,)),
-            "low": (np.float64, (count,)),
-            "high": (np.float64, (count,)),
-            "samples": (np.int32, (count,)),
-        }
-        self._check_arrays("success table", shapes)
+        self._check_arrays()
+        inside = (self.low >= 0.0) & (self.low <= self.success)
+        inside &= (self.success <= self.high) & (self.high <= 1.0)
+        # Rounding of a mean of ones must not refuse it.
+        require(bool(np.all(inside)), f"{self.WHAT}: 0 <= low <= success <= high <= 1 must hold.")
+        require(bool(np.all(self.samples > 0)), f"{self.WHAT}: samples must be positive.")
+
+    def at(self, row: int) -> tuple[float, float, float]:
+        """Return mean, lower and upper end of a set."""
+        return float(self.success[row]), float(self.low[row]), float(self.high[row])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SuccessTable(Estimates):
+    """Estimated success of K sets of a grid, with their members.
+
+    Order of the sets: singles by configuration index, then pairs in lexicographic order, then
+    triples, as in `SetTable`.
+    """
+
+    members: NDArray[np.int32]
+    """Flat configuration indices, ascending, NO_MEMBER after the last, shape (K, m)."""
+
+    WHAT = "success table"
+    COLUMNS: ClassVar[Columns] = {
+        "members": Column(np.int32, "K m", Form.PLUS_ONE),
+        **Estimates.COLUMNS,
+    }
+
+    def __post_init__(self) -> None:
+        """Check the arrays against each other and make them read-only.
+
+        Raises:
+            TcsError: If an array has the wrong type, shape or range.
+        """
+        super().__post_init__()
         require(
             1 <= self.members.shape[1] <= MOST_MEMBERS,
             f"success table: sets must have 1 to {MOST_MEMBERS} members.",
         )
-        inside = (self.low >= 0.0) & (self.low <= self.success)
-        inside &= (self.success <= self.high) & (self.high <= 1.0)
-        # Rounding of a mean of ones must not refuse it.
-        require(bool(np.all(inside)), "success table: 0 <= low <= success <= high <= 1 must hold.")
-        require(bool(np.all(self.samples > 0)), "success table: samples must be positive.")
         self._check_members()
 
     def _check_members(self) -> None:

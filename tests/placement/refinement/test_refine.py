@@ -39,10 +39,11 @@ from tcs.placement.refinement.success_under_error import (
 )
 from tcs.placement.robustness import PerturbedPoints, Trials, success_summary
 from tcs.placement.store.encoding import decode, encode
-from tcs.placement.tables import Reason, RefinedSet, RefinedSuccess
+from tcs.placement.tables import Estimates, Reason, RefinedSet
 from tests.beside import BESIDE
 
-NAMES, ONE = ("mean", "low", "high"), np.array([0.5])
+NAMES, ONE = ("success", "low", "high"), np.array([0.5])
+ONCE = np.ones(1, np.int32)
 HERE = tcs.InitialConfiguration(base_x=1.4, base_y=-1.2, base_yaw=3.14, torso=0.15)
 
 
@@ -151,21 +152,21 @@ def check_estimates(file):
     table, found = file.nominal.refined, file.nominal.refined.success
     trials = Trials.of(file)
     samples = PerturbedPoints(trials, trials.errors.draw(40, 0, stream="race"), 1)
-    assert found.samples == 40
+    assert np.all(found.samples == 40)
     for row in range(len(table.origin)):
         values = table.values[row, : table.sizes[row]]
         reached = samples.reached(values).any(axis=0)
-        assert found.mean[row] == pytest.approx(reached.mean(axis=0) @ trials.weights, abs=1e-12)
+        assert found.success[row] == pytest.approx(reached.mean(axis=0) @ trials.weights, abs=1e-12)
 
 
 def test_refined_sets_get_the_success_of_the_same_samples(estimated):
     check_estimates(estimated)
     found = estimated.nominal.refined.success
-    assert np.ptp(found.mean) > 0.0
-    assert np.all((found.low < found.mean) & (found.mean <= found.high))
+    assert np.ptp(found.success) > 0.0
+    assert np.all((found.low < found.success) & (found.success <= found.high))
     surest = success_summary(estimated)["tables"][0]["refined"]
     assert surest["ci95"][0] == found.low.max()
-    assert surest["success"] == found.mean[surest["row"]]
+    assert surest["success"] == found.success[surest["row"]]
 
 
 def test_refinement_after_the_estimates_adds_those_of_its_sets(estimated):
@@ -174,17 +175,17 @@ def test_refinement_after_the_estimates_adds_those_of_its_sets(estimated):
 
 def test_estimates_of_refined_sets_are_stored(estimated):
     loaded = decode(encode(estimated)).nominal.refined.success
-    assert loaded.samples == 40
-    for name in ("mean", "low", "high"):
+    assert np.all(loaded.samples == 40)
+    for name in NAMES:
         of_file = getattr(estimated.nominal.refined.success, name)
         np.testing.assert_array_equal(getattr(loaded, name), of_file)
     with pytest.raises(TcsError, match="one success for each set"):
         dataclasses.replace(
             estimated.nominal.refined,
-            success=RefinedSuccess(**dict.fromkeys(NAMES, ONE), samples=1),
+            success=Estimates(**dict.fromkeys(NAMES, ONE), samples=ONCE),
         )
-    with pytest.raises(TcsError, match="low <= mean"):
-        RefinedSuccess(mean=ONE, low=ONE + 0.1, high=ONE, samples=1)
+    with pytest.raises(TcsError, match="low <= success"):
+        Estimates(success=ONE, low=ONE + 0.1, high=ONE, samples=ONCE)
 
 
 def test_selection_by_success_compares_refined_sets(refined, estimated):
@@ -202,7 +203,7 @@ def test_selection_by_success_compares_refined_sets(refined, estimated):
     ]
     if max(utilities) > grid.net_utility:
         assert choice.refined == int(np.argmax(utilities))
-        assert choice.success == table.success.mean[choice.refined]
+        assert choice.success == table.success.success[choice.refined]
         assert choice.success_ci95[0] == table.success.low[choice.refined]
         assert choice.net_utility == pytest.approx(max(utilities))
     else:
@@ -218,7 +219,7 @@ def test_selection_by_success_compares_refined_sets(refined, estimated):
 def test_a_sure_refined_set_is_selected(estimated):
     table = estimated.nominal.refined
     certain = np.ones(len(table.origin))
-    sure = RefinedSuccess(mean=certain, low=certain, high=certain, samples=1)
+    sure = Estimates(success=certain, low=certain, high=certain, samples=certain.astype(np.int32))
     scored = dataclasses.replace(
         estimated.nominal, refined=dataclasses.replace(table, success=sure)
     )

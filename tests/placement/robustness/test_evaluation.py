@@ -12,6 +12,7 @@ from tcs.errors import SelectionError, TcsError, UnknownNameError
 from tcs.model.scene import ErrorDistribution
 from tcs.placement.robustness import Trials, evaluate, mean_of
 from tcs.placement.tables import tc_reachability
+from tcs.placement.tables.sets import Groups
 
 NOTHING = {"person_x": ErrorDistribution(distribution="normal", std=0.0)}
 
@@ -128,7 +129,7 @@ def test_equal_sets_have_the_greatest_reachability(bed_trials, members):
     sets = bed_trials.scored.sets
     of_single = sets.single_reachability
     greatest = (
-        of_single.max() if members == 1 else max(of_single.max(), sets.pair_reachability.max())
+        of_single.max() if members == 1 else max(of_single.max(), sets.pairs.reachability.max())
     )
     for drawn in {tuple(row) for row in found.sets.tolist()}:
         assert sets.scores_of(drawn)[0] == pytest.approx(greatest, abs=1e-9)
@@ -170,14 +171,16 @@ def test_a_table_without_candidates_is_refused(bed_trials):
         dexterity=np.empty((0, 14), np.float32),
         cell=np.empty(0, np.int32),
         cell_xy=np.empty((0, 2)),
-        pair_cells=np.empty((0, 2), np.int32),
-        pair_count=np.empty(0, np.int64),
-        pair_reachability=np.empty(0),
-        pair_manipulability=np.empty(0, np.float32),
-        pair_sum=np.empty(0, np.float32),
-        member_reachability=np.empty(0),
-        member_manipulability=np.empty(0, np.float32),
-        member_sum=np.empty(0, np.float32),
+        pairs=Groups(
+            cells=np.empty((0, 2), np.int32),
+            count=np.empty(0, np.int64),
+            **{f"{of}reachability": np.empty(0) for of in ("", "member_")},
+            **{
+                f"{of}{what}": np.empty(0, np.float32)
+                for of in ("", "member_")
+                for what in ("manipulability", "total")
+            },
+        ),
         best=(),
         best_single=(),
     )

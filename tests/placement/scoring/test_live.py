@@ -76,7 +76,7 @@ def assert_same_scores(one, other):
         np.testing.assert_array_equal(getattr(one.scores, name), getattr(other.scores, name))
     np.testing.assert_array_equal(blamed(one.scores), blamed(other.scores))
     assert one.sets.best == other.sets.best
-    np.testing.assert_array_equal(one.sets.pair_cells, other.sets.pair_cells)
+    np.testing.assert_array_equal(one.sets.pairs.cells, other.sets.pairs.cells)
 
 
 def test_some_base_positions_have_the_scores_that_they_have_among_all(bed_scorer):

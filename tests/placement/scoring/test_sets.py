@@ -48,14 +48,14 @@ def test_agrees_with_plain_loops_over_all_pairs(table, min_distance, bed, rule, 
     for members, pair in expected.items():
         if len(members) == 2:
             kept.setdefault(tuple(sorted(cell[h] for h in members)), []).append(pair)
-    assert [tuple(cells) for cells in sets.pair_cells.tolist()] == sorted(kept)
+    assert [tuple(cells) for cells in sets.pairs.cells.tolist()] == sorted(kept)
     for k, cells in enumerate(sorted(kept)):
         reachability, manipulability = np.array(kept[cells]).T
-        assert sets.pair_count[k] == len(kept[cells])
-        assert sets.pair_reachability[k] == reachability.max()
+        assert sets.pairs.count[k] == len(kept[cells])
+        assert sets.pairs.reachability[k] == reachability.max()
         for bound, exact in (
-            (sets.pair_manipulability[k], manipulability.max()),
-            (sets.pair_sum[k], (reachability + manipulability).max()),
+            (sets.pairs.manipulability[k], manipulability.max()),
+            (sets.pairs.total[k], (reachability + manipulability).max()),
         ):
             # Never below, and no more than one float32 step above.
             assert exact <= float(bound)
@@ -64,10 +64,10 @@ def test_agrees_with_plain_loops_over_all_pairs(table, min_distance, bed, rule, 
     for c, h in enumerate(sets.candidates.tolist()):
         of_h = [pair for members, pair in expected.items() if len(members) == 2 and h in members]
         reachability, manipulability = np.array(of_h).reshape(-1, 2).T
-        assert sets.member_reachability[c] == reachability.max(initial=0.0)
+        assert sets.pairs.member_reachability[c] == reachability.max(initial=0.0)
         for bound, exact in (
-            (sets.member_manipulability[c], manipulability.max(initial=0.0)),
-            (sets.member_sum[c], (reachability + manipulability).max(initial=0.0)),
+            (sets.pairs.member_manipulability[c], manipulability.max(initial=0.0)),
+            (sets.pairs.member_total[c], (reachability + manipulability).max(initial=0.0)),
         ):
             assert exact <= float(bound) <= float(np.nextafter(np.float32(exact), np.float32(9.0)))
 
@@ -225,7 +225,7 @@ def test_places_a_rounding_error_short_of_the_distance_are_paired():
     )
     sets = build_sets(scores, grid)
     apart = [(a, b) for a, b in itertools.product(range(10), range(10, 20)) if b - a >= 8]
-    assert [tuple(cells) for cells in sets.pair_cells.tolist()] == apart
+    assert [tuple(cells) for cells in sets.pairs.cells.tolist()] == apart
 
 
 def test_nothing_reached_gives_no_sets():

@@ -5,6 +5,7 @@ import pytest
 
 from tcs.errors import TcsError
 from tcs.placement.tables import BaseLattice, SetTable
+from tcs.placement.tables.sets import Groups
 
 NO_MOVES = BaseLattice(start=(0.0, 0.0), step=(0.5, 0.5), moves=np.zeros((4, 2, 2), dtype=np.bool_))
 
@@ -23,14 +24,16 @@ def parts():
         "dexterity": np.array([[0.5, 0.0], [0.0, 0.0], [0.0, 0.25]], dtype=np.float32),
         "cell": np.array([0, 0, 1], dtype=np.int32),
         "cell_xy": np.array([[0.0, 0.0], [0.5, 0.0]]),
-        "pair_cells": np.array([[0, 1]], dtype=np.int32),
-        "pair_count": np.array([1]),
-        "pair_reachability": np.array([1.0]),
-        "pair_manipulability": np.array([0.375], dtype=np.float32),
-        "pair_sum": np.array([1.375], dtype=np.float32),
-        "member_reachability": np.array([1.0, 0.0, 1.0]),
-        "member_manipulability": np.array([0.375, 0.0, 0.375], dtype=np.float32),
-        "member_sum": np.array([1.375, 0.0, 1.375], dtype=np.float32),
+        "pairs": Groups(
+            cells=np.array([[0, 1]], dtype=np.int32),
+            count=np.array([1]),
+            reachability=np.array([1.0]),
+            manipulability=np.array([0.375], dtype=np.float32),
+            total=np.array([1.375], dtype=np.float32),
+            member_reachability=np.array([1.0, 0.0, 1.0]),
+            member_manipulability=np.array([0.375, 0.0, 0.375], dtype=np.float32),
+            member_total=np.array([1.375, 0.0, 1.375], dtype=np.float32),
+        ),
         "triples": None,
         "best": (4, 7),
         "best_single": (4,),
@@ -76,13 +79,8 @@ WRONG = {
     "cell": ({"cell": np.array([0, 0, 2], dtype=np.int32)}, r"cell outside 0\.\.1"),
     "empty cell": ({"cell": np.array([0, 0, 0], dtype=np.int32)}, "a cell has no candidate"),
     "cell_xy": ({"cell_xy": np.array([[0.0, np.nan], [0.5, 0.0]])}, "finite"),
-    "pair_cells": ({"pair_cells": np.array([[1, 0]], dtype=np.int32)}, "first <= second"),
-    "beyond": ({"pair_cells": np.array([[0, 2]], dtype=np.int32)}, r"within 0\.\.1"),
-    "too many": ({"pair_count": np.array([3])}, "pair_count"),
-    "none": ({"pair_count": np.array([0])}, "pair_count"),
-    "bound": ({"pair_sum": np.array([np.inf], dtype=np.float32)}, "pair_sum"),
-    "bound of a member": ({"member_sum": np.full(3, np.nan, dtype=np.float32)}, "member_sum"),
-    "type": ({"pair_sum": np.array([1.375])}, "float32"),
+    "pairs": ({"pairs": None}, "pairs must be groups of two"),
+    "type": ({"dexterity": np.zeros((3, 2))}, "float32"),
     "best": ({"best": (4, 6)}, "best must name"),
     "best of three": ({"best": (4, 5, 7)}, "best must name"),
     "no best": ({"best_single": ()}, "best_single must name"),

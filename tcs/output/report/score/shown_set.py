@@ -174,8 +174,7 @@ class ShownSet:
         if found is None:
             return None
         row = self.refined.row
-        mean, low, high = (float(array[row]) for array in (found.mean, found.low, found.high))
-        return SuccessEstimate(mean, low, high, found.samples)
+        return SuccessEstimate(*found.at(row), int(found.samples[row]))
 
     @property
     def places(self) -> list[str]:
@@ -233,5 +232,4 @@ def estimate_of(success: SuccessTable | None, members: tuple[int, ...]) -> Succe
     row = success.row_of(members) if success is not None and members else None
     if success is None or row is None:
         return None
-    mean, low, high = (float(of[row]) for of in (success.success, success.low, success.high))
-    return SuccessEstimate(mean, low, high, int(success.samples[row]))
+    return SuccessEstimate(*success.at(row), int(success.samples[row]))
