@@ -102,21 +102,6 @@ def evaluate(
 
     loaded = tcs.load(file)
     table = table_of(loaded, observed)
-    if select == "refined":
-        from tcs.placement.refinement import evaluate_refined
-
-        found = evaluate_refined(
-            loaded,
-            samples=1000 if samples is None else samples,
-            seed=seed,
-            errors=errors,
-            table=table,
-            body_collisions="all" if check_base else body_collisions,
-            jobs=jobs,
-            on_compile=terminal.note_compiling,
-        )
-        terminal.print_result(found.to_json(), set_tables.report_evaluation, as_json=as_json)
-        return
     with terminal.progress_bar("configurations in samples") as on_progress:
         found = tcs.evaluate(
             loaded,

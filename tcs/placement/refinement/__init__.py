@@ -5,14 +5,13 @@ In: a score file. Out: the file with refined sets beside those of its grid.
 
 from __future__ import annotations
 
-from tcs.placement.refinement.evaluation import (
+from tcs.placement.refinement.place import Placement, place
+from tcs.placement.refinement.points import (
+    PointScorer,
+    PointScores,
     RefinedMembers,
-    evaluate_refined,
-    refined_table,
     score_members,
 )
-from tcs.placement.refinement.place import Placement, place
-from tcs.placement.refinement.points import PointScorer, PointScores
 from tcs.placement.refinement.refined_file import OBJECTIVES, refine, refinement_summary
 
 __all__ = [
@@ -21,10 +20,8 @@ __all__ = [
     "PointScorer",
     "PointScores",
     "RefinedMembers",
-    "evaluate_refined",
     "place",
     "refine",
-    "refined_table",
     "refinement_summary",
     "score_members",
 ]

@@ -15,7 +15,7 @@ from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.rows import Rows
 from tcs.kernel.scores import Scores, new_scores
-from tcs.model.grid import ROBOT_AXES, Grid
+from tcs.model.grid import ROBOT_AXES, Grid, InitialConfiguration
 from tcs.model.scene import LoweredScene, Scene, environment_at, torso_at
 from tcs.placement.constraints import Footprint
 from tcs.placement.scoring.approaches import ApproachScorer, approach_lines
@@ -27,7 +27,7 @@ from tcs.placement.scoring.scorer import Scorer
 from tcs.placement.scoring.sweep import name_contacts
 from tcs.placement.scoring.together import Hands, together_at
 from tcs.placement.store import APPROACH, ScoreFile
-from tcs.placement.tables import Reason, ScoreTable
+from tcs.placement.tables import Reason, RefinedSet, ScoreTable
 
 if TYPE_CHECKING:
     from tcs.kernel.approach.sweep import ApproachLines
@@ -232,3 +232,34 @@ class PointScorer:
             arm_base_R=raised.arm_base_R, arm_base_p=raised.arm_base_p, body=raised.body
         )
         return build_problem(arrays, self.measure)
+
+
+class RefinedMembers(NamedTuple):
+    """The members of a refined set, in the order of the visits."""
+
+    members: tuple[InitialConfiguration, ...]
+    """The configurations."""
+    scores: ScoreTable
+    """Their scores, a row for each."""
+
+
+def score_members(file: ScoreFile, chosen: RefinedSet, jobs: int = 2) -> RefinedMembers:
+    """Return the members of a refined set with their scores, computed by the kernel.
+
+    The file holds what the members reach; this has the reasons, and the bodies in contact, too.
+
+    Args:
+        file: A score file with refined sets.
+        chosen: The set.
+        jobs: Number of threads.
+
+    Raises:
+        StoreMismatchError: If the file was made from other models.
+        SelectionError: If the table was not refined.
+    """
+    refined = file.tables[chosen.table].refined_sets
+    at = chosen.row, list(chosen.order)
+    scorer = PointScorer.of(file, chosen.table, jobs)
+    scores = scorer.score_table(refined.values[at], refined.weights)
+    members = refined.members(file.configurations, chosen.row)
+    return RefinedMembers(tuple(members[i] for i in chosen.order), scores)

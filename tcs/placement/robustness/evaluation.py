@@ -16,14 +16,16 @@ from tcs.files.blocks import BlockFolder
 from tcs.model.random_streams import check_draws
 from tcs.placement.robustness.error_model import ErrorModel, Offsets
 from tcs.placement.robustness.kept_pairs import EQUAL_REACHABILITY, uniform_sets
+from tcs.placement.robustness.perturbed_points import PerturbedPoints
 from tcs.placement.robustness.statistics import Mean, mean_of
 from tcs.placement.robustness.trials import Errors, Progress, Trials
 from tcs.placement.store import ScoreFile, StateTables, state_to_json
 from tcs.placement.tables import tc_reachability
 
-SELECTIONS = ("best", "single", "robust", "uniform", "equal")
+SELECTIONS = ("best", "single", "robust", "refined", "uniform", "equal")
 """Sets to evaluate: the set with the greatest P_R + P_M; the best single configuration; the most
-robust set (greatest lower confidence bound on success, estimated by `robustify`); or, as the
+robust set (greatest lower confidence bound on success, estimated by `robustify`); a refined set,
+the best one unless its number is given; or, as the
 paper's "without TC-manipulability", another set in every sample, drawn uniformly from those whose
 P_R is at least 0.98 of the greatest, as in hrl_base_selection, or equal to it, as printed."""
 
@@ -129,6 +131,7 @@ def evaluate(
     errors: Errors = None,
     select: str | Sequence[int] = "best",
     members: int = 2,
+    row: int = 0,
     table: int | None = None,
     body_collisions: str | None = None,
     stream: str = "",
@@ -152,13 +155,14 @@ def evaluate(
             Not for trials, which include their errors.
         select: One of `SELECTIONS`, or flat configuration indices of the members of a set.
         members: Number of members of the sets of "uniform" and "equal", 1 or 2.
+        row: Number of the set of "refined", the best first.
         table: Number of the file's table; by default the nominal one. Not for trials.
         body_collisions: Collisions of the robot's body that count, one of `BODY_COLLISIONS`; by
             default `paper`. Not for trials.
         stream: Name of the draw; another name gives independent samples.
         jobs: Number of threads.
         blocks: Folder in which finished blocks are kept, so that the same call continues after an
-            interrupt; None to keep none.
+            interrupt; None to keep none. Those of "refined" are not kept.
         on_progress: Called with the number of evaluated pairs of configuration and sample, and of
             all such pairs.
         on_compile: Called first if the kernel has to be compiled.
@@ -196,18 +200,29 @@ def evaluate(
             on_compile=on_compile,
         )
     offsets = trials.errors.draw(samples, seed, stream=stream)
-    sets, choices = _chosen(trials.scored, select, members, samples, seed)
     is_drawn = isinstance(select, str) and select in _DRAWN
+    refined = trials.scored.refined_set(row) if select == "refined" else None
+    if refined is not None:
+        sets, choices = refined.origin.astype(np.int64), 1
+    else:
+        sets, choices = _chosen(trials.scored, select, members, samples, seed)
     with trials.kept_in(blocks) as kept:
         if is_drawn:
             # Set i is evaluated on sample i only, with all of its members.
             tiled = {name: np.tile(values, sets.shape[1]) for name, values in offsets.items()}
             found = kept.reached_each(sets.T.ravel(), tiled, jobs=jobs, on_progress=on_progress)
             found = found.reshape(sets.shape[1], samples, -1)
+        elif refined is not None:
+            found = PerturbedPoints(trials, offsets, jobs).reached(refined.values[0])
         else:
             found = kept.reached(sets[0], offsets, jobs=jobs, on_progress=on_progress)
     reached: NDArray[np.bool_] = np.logical_or.reduce(found, axis=0)
-    scores = np.array([trials.scored.sets.scores_of(tuple(map(int, row))) for row in sets])
+    if refined is not None:
+        scores = np.array([[refined.reachability[0], refined.manipulability[0]]])
+        of_set = refined.members(trials.grid, 0)
+    else:
+        scores = np.array([trials.scored.sets.scores_of(tuple(map(int, one))) for one in sets])
+        of_set = () if is_drawn else tuple(map(trials.grid.configuration, sets[0].tolist()))
     for array in (sets, reached, *offsets.values()):
         array.flags.writeable = False
     return Evaluation(
@@ -219,7 +234,9 @@ def evaluate(
         reachability=float(scores[:, 0].mean()),
         manipulability=float(scores[:, 1].mean()),
         choices=choices,
-        clipped=trials.clipped(sets, offsets),
+        clipped=trials.clipped(sets, offsets)
+        if refined is None
+        else trials.clipped_at(refined.values[0], offsets),
         errors=trials.errors,
         body_collisions=trials.body_collisions,
         approach=trials.with_approach,
@@ -231,9 +248,7 @@ def evaluate(
             "environment": trials.job.spec.environment.name,
             "robot": trials.file.robot["name"],
         },
-        members=()
-        if is_drawn
-        else tuple(trials.grid.configuration(int(h)).to_json() for h in sets[0]),
+        members=tuple(member.to_json() for member in of_set),
     )
 
 

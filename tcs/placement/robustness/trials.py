@@ -390,6 +390,14 @@ class Trials:
             beyond |= self.positions(int(number), offsets)[1] & (state == number).any(axis=1)
         return int(np.count_nonzero(beyond))
 
+    def clipped_at(self, points: FloatArray, offsets: Offsets) -> int:
+        """Return the same for the members of one set, by values of the axes, shape (m, axes)."""
+        beyond = np.zeros(samples_of(offsets), dtype=np.bool_)
+        for point in points.tolist():
+            at = {axis.name: v for axis, v in zip(self.grid.environment_axes, point, strict=False)}
+            beyond |= displaced(self.job, self.scene, {**self.observed, **at}, offsets)[1]
+        return int(np.count_nonzero(beyond))
+
     def poses(self, members: ArrayLike) -> Rows:
         """Return the base poses of configurations, given by flat index.
 

@@ -105,10 +105,6 @@ class DrakeChecker:
         self._grid = job.scored_grid
         self._axes = [axis.name for axis in self._grid.environment_axes]
 
-    def check(self, h: int, g: int, q: NDArray[np.float64], value: float) -> Finding:
-        """Return the finding for configuration h, goal g and joint angles q."""
-        return self.check_at(self.values(h), g, q, value)
-
     def pose_other_arm(self, q: NDArray[np.float64]) -> None:
         """Pose the arm that works at the same time, at joint angles q [rad], for what follows."""
         self._scene.set_robot_joints(self._job.other_joints, q)

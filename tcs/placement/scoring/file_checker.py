@@ -44,6 +44,8 @@ class Posture(NamedTuple):
     """Joints [rad], shape (7,)."""
     other: NDArray[np.float64] | None
     """Joints of the other arm [rad], shape (7,); None for a goal by itself."""
+    other_hand: int | None = None
+    """Number of the other hand; None for that of the stored scores."""
 
 
 class _Scan(NamedTuple):
@@ -120,19 +122,33 @@ class FileChecker:
         hand = self.tables[table].scores.hand
         return 0 if hand is None else int(hand[row, g])
 
-    def check(self, h: int, g: int, posture: Posture) -> Finding:
-        """Return Drake's finding for configuration h and goal g, and for the goal of its pair."""
+    def check(
+        self,
+        h: int,
+        g: int,
+        posture: Posture,
+        off_grid: NDArray[np.float64] | None = None,
+    ) -> Finding:
+        """Return Drake's finding for configuration h and goal g, and for the goal of its pair.
+
+        Args:
+            h: The configuration, or the one whose observed state is that of one off the grid.
+            g: The goal.
+            posture: How it is reached.
+            off_grid: Values of the axes [m or rad] in place of those of h.
+        """
         hand, partner = posture.hand, self.partner[g]
-        goal = self.goals[hand].index(g)
+        drake, goal = self.drakes[hand], self.goals[hand].index(g)
         if partner is None or posture.other is None:
-            return self.drakes[hand].check(h, goal, posture.q, posture.value)
-        other = self.hand(h, partner)
-        self.drakes[hand].pose_other_arm(posture.other)
-        self.drakes[other].pose_other_arm(posture.q)
-        goal_of_other = self.goals[other].index(partner)
+            return drake.check_at(drake.values(h, off_grid), goal, posture.q, posture.value)
+        other = self.hand(h, partner) if posture.other_hand is None else posture.other_hand
+        drake_of_other, goal_of_other = self.drakes[other], self.goals[other].index(partner)
+        drake.pose_other_arm(posture.other)
+        drake_of_other.pose_other_arm(posture.q)
+        at = drake_of_other.values(h, off_grid)
         return of_both(
-            self.drakes[hand].check(h, goal, posture.q, posture.value),
-            self.drakes[other].check(h, goal_of_other, posture.other, posture.value),
+            drake.check_at(drake.values(h, off_grid), goal, posture.q, posture.value),
+            drake_of_other.check_at(at, goal_of_other, posture.other, posture.value),
             posture.value,
         )
 
@@ -170,20 +186,22 @@ class FileChecker:
         """Return Drake's findings on the solutions of refined sets."""
         findings = []
         for pair in pairs:
-            refined = self.tables[pair.table].refined
-            assert refined is not None
+            refined = self.tables[pair.table].refined_sets
             at = pair.set, pair.member
+            hands = (
+                np.zeros(refined.reached.shape, np.uint8) if refined.hand is None else refined.hand
+            )
+            joints, partner = refined.arm_joints[at].astype(np.float64), self.partner[pair.goal]
+            posture = Posture(
+                int(hands[*at, pair.goal]),
+                float(refined.dexterity[*at, pair.goal]),
+                joints[pair.goal],
+                None if partner is None else joints[partner],
+                None if partner is None else int(hands[*at, partner]),
+            )
             # The origin has the observed state of the refined member.
             origin = pair.table * self.size + int(refined.origin[at])
-            hand = 0 if refined.hand is None else int(refined.hand[*at, pair.goal])
-            findings.append(
-                self.drakes[hand].check_at(
-                    self.drakes[hand].values(origin, refined.values[at]),
-                    self.goals[hand].index(pair.goal),
-                    refined.arm_joints[*at, pair.goal].astype(np.float64),
-                    float(refined.dexterity[*at, pair.goal]),
-                )
-            )
+            findings.append(self.check(origin, pair.goal, posture, refined.values[at]))
             step()
         return findings
 

@@ -12,7 +12,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.errors import StoreError, StoreMismatchError
+from tcs.errors import SelectionError, StoreError, StoreMismatchError
 from tcs.files.plain import plain
 from tcs.model.grid import Axis, Grid
 from tcs.placement.store.robot_shapes import RobotShapes
@@ -98,6 +98,33 @@ class StateTables:
     def derived(self) -> dict[str, Any]:
         """What other packages derived from the tables, by name, kept while the tables live."""
         return {}
+
+    @property
+    def refined_sets(self) -> RefinedTable:
+        """The refined sets.
+
+        Raises:
+            SelectionError: If there are none.
+        """
+        if self.refined is None:
+            raise SelectionError(
+                "No sets of this table were refined. Refine them: tcs refine FILE."
+            )
+        return self.refined
+
+    def refined_set(self, row: int) -> RefinedTable:
+        """Return one of the refined sets as a table of it alone, as wide as it has members.
+
+        Raises:
+            SelectionError: If there is no such set.
+        """
+        refined = self.refined_sets
+        if not 0 <= row < len(refined.origin):
+            raise SelectionError(
+                f"There is no refined set {row}; the table has {len(refined.origin)}, counted from "
+                "0."
+            )
+        return refined.only(row)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the fields alone: a copy decodes the scores itself if it needs them."""

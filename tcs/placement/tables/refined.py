@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -91,6 +91,21 @@ class RefinedTable(ArrayTable):
         require(
             self.success is None or len(self.success.low) == len(self.origin),
             "refined table: there must be one success for each set.",
+        )
+
+    def only(self, row: int) -> RefinedTable:
+        """Return one of the sets, as wide as it has members."""
+        size = int(self.sizes[row])
+        arrays = {
+            name: getattr(self, name) for name in ("origin", "values", "reached", "dexterity")
+        }
+        return replace(
+            self,
+            **{name: array[row : row + 1, :size] for name, array in arrays.items()},
+            arm_joints=self.arm_joints[row : row + 1, :size],
+            hand=None if self.hand is None else self.hand[row : row + 1, :size],
+            objective=self.objective[row : row + 1],
+            success=None,
         )
 
     def members(self, grid: Grid, row: int) -> tuple[InitialConfiguration, ...]:

@@ -18,7 +18,6 @@ from tcs.output.report.score.shown_set import ShownSet
 from tcs.output.view import Controls, ViewedSet
 from tcs.placement.refinement import (
     PointScorer,
-    evaluate_refined,
     refinement_summary,
     score_members,
 )
@@ -446,14 +445,14 @@ def test_a_refined_set_is_evaluated_like_one_of_the_grid(scored, refined):
     file = dataclasses.replace(
         refined, tables=(dataclasses.replace(refined.nominal, refined=on_grid),)
     )
-    found = evaluate_refined(file, row=row, samples=20)
+    found = tcs.evaluate(file, select="refined", row=row, samples=20)
     np.testing.assert_array_equal(found.reached, tcs.evaluate(scored, samples=20).reached)
-    moved = evaluate_refined(refined, row=row, samples=20)
+    moved = tcs.evaluate(refined, select="refined", row=row, samples=20)
     assert moved.members != found.members
     with pytest.raises(SelectionError, match="no refined set 99"):
-        evaluate_refined(refined, row=99)
+        tcs.evaluate(refined, select="refined", row=99)
     with pytest.raises(SelectionError, match="No sets of this table were refined"):
-        evaluate_refined(scored)
+        tcs.evaluate(scored, select="refined")
 
 
 def of_two_goals(stop, index, number, goals, *how):

@@ -12,7 +12,7 @@ from tcs.kernel.approach.sweep import approach_spline
 from tcs.kernel.rows import grid_rows
 from tcs.motion import check_approaches
 from tcs.motion.approach_check import ApproachScene
-from tcs.placement.refinement import PointScorer, evaluate_refined, score_members
+from tcs.placement.refinement import PointScorer, score_members
 from tcs.placement.robustness import PerturbedPoints, Trials
 from tcs.placement.scoring.rebuild import rebuild_scenes
 from tcs.placement.tables import Reason, RefinedSet
@@ -135,7 +135,7 @@ def test_the_base_is_where_it_is_at_the_torso_height(scored, monkeypatch):
 
 def test_evaluations_say_that_they_count_approachable_postures(scored, refined):
     assert tcs.evaluate(scored, samples=3).to_json()["approach"] is True
-    assert evaluate_refined(refined, samples=3).to_json()["approach"] is True
+    assert tcs.evaluate(refined, select="refined", samples=3).to_json()["approach"] is True
 
 
 def test_blocks_of_trials_with_approach_are_others(scored):

@@ -83,7 +83,11 @@ def test_drake_refuses_arms_that_touch(pair):
         hand = checker.hand(h, goal)
         checker.drakes[hand].pose_other_arm(of_other)
         number = checker.goals[hand].index(goal)
-        contacts += checker.drakes[hand].check(h, number, joints, value).contacts
+        contacts += (
+            checker.drakes[hand]
+            .check_at(checker.drakes[hand].values(h), number, joints, value)
+            .contacts
+        )
     assert finding.contacts == contacts > 0
     assert not checker.check(h, 0, Posture(0, value + 0.01, q, other)).dexterity_error < 0.009
 

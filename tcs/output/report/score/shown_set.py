@@ -20,7 +20,7 @@ from tcs.output.words import (
     place_of_state,
     scores_text,
 )
-from tcs.placement.refinement import refined_table, score_members
+from tcs.placement.refinement import score_members
 from tcs.placement.scoring import Job, rebuild_scenes, whole_task
 from tcs.placement.selection import Choice, nearest_table, select
 from tcs.placement.store import ScoreFile
@@ -170,7 +170,7 @@ class ShownSet:
         table = self.file.tables[self.table]
         if self.refined is None:
             return estimate_of(table.success, self.stored)
-        found = refined_table(self.file, self.table).success
+        found = self.file.tables[self.table].refined_sets.success
         if found is None:
             return None
         row = self.refined.row
@@ -217,7 +217,7 @@ class ShownSet:
             return (0.0, 0.0)
         if self.refined is None:
             return self.file.tables[self.table].sets.scores_of(self.stored)
-        refined = refined_table(self.file, self.refined.table)
+        refined = self.file.tables[self.refined.table].refined_sets
         row = self.refined.row
         return float(refined.reachability[row]), float(refined.manipulability[row])
 
