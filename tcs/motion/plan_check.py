@@ -22,7 +22,7 @@ from tcs.motion.stops import Stop
 from tcs.motion.timing import Timed
 from tcs.placement.scoring.drake_check import pose_errors
 from tcs.placement.scoring.job import Job
-from tcs.placement.scoring.rebuild import rebuild_made_from
+from tcs.placement.scoring.rebuild import rebuild_scenes
 
 ROUNDING = 1e-9
 """Greatest difference of the posture between two segments [rad], and greatest velocity at their
@@ -153,12 +153,12 @@ def hands_of(plan: MotionPlan, *, meshes: bool = False) -> dict[str, PlanHand]:
         StoreMismatchError: If the models have changed since the plan was made.
         StoreFormatError: If it names hands, goals, joints or axes that its scene does not have.
     """
-    built = rebuild_made_from(plan.made_from, meshes=meshes)
+    built = rebuild_scenes(plan.made_from, meshes=meshes)
     if len(built) == 1:
-        (job, scene) = built[0]
+        job, scene, _ = built[0]
         found = {"": PlanHand(job, scene, tuple(range(len(job.task.goals))))}
     else:
-        found = {job.hand.name: PlanHand(job, scene, job.goal_numbers) for job, scene in built}
+        found = {job.hand.name: PlanHand(job, scene, job.goal_numbers) for job, scene, _ in built}
     _check_names(plan, found)
     return found
 

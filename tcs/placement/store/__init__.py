@@ -23,7 +23,6 @@ from tcs.placement.store.score_file import (
     WITHOUT_APPROACH,
     ScoreFile,
     StateTables,
-    check_scene,
     state_to_json,
 )
 
@@ -40,7 +39,6 @@ __all__ = [
     "MotionFile",
     "ScoreFile",
     "StateTables",
-    "check_scene",
     "load_motions",
     "load_scores",
     "motion_path",

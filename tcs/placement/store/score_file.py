@@ -12,7 +12,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.errors import SelectionError, StoreError, StoreMismatchError
+from tcs.errors import SelectionError, StoreError
 from tcs.files.plain import plain
 from tcs.model.grid import Axis, Grid
 from tcs.placement.store.robot_shapes import RobotShapes
@@ -456,24 +456,3 @@ def state_to_json(axes: tuple[Axis, ...], state: Mapping[str, float]) -> dict[st
         for axis in axes
         if axis.name in state
     }
-
-
-def check_scene(file: ScoreFile, digest: str, hand: int | None = None) -> None:
-    """Check that the scores of a file were computed from the installed models.
-
-    Args:
-        file: A loaded score file.
-        digest: Digest of the lowered scene of the installed models.
-        hand: Number of the hand whose scene it is, in a file of several.
-
-    Raises:
-        StoreMismatchError: If the digests differ.
-    """
-    stored = (file.metadata if hand is None else file.hands[hand])["scene_digest"]
-    if stored != digest:
-        raise StoreMismatchError(
-            f"Scores of '{file.metadata['task']}' were made by tcs "
-            f"{file.metadata['program_version']} from other models (scene {stored[:12]}) than "
-            f"those installed now (scene {digest[:12]}). Score the task again; choosing from the "
-            "file still works."
-        )
