@@ -213,13 +213,11 @@ class ShownSet:
 
     @property
     def _pair(self) -> tuple[float, float]:
+        if self.choice is not None:
+            return self.choice.reachability, self.choice.manipulability
         if not self.members:
             return (0.0, 0.0)
-        if self.refined is None:
-            return self.file.tables[self.table].sets.scores_of(self.stored)
-        refined = self.file.tables[self.refined.table].refined_sets
-        row = self.refined.row
-        return float(refined.reachability[row]), float(refined.manipulability[row])
+        return self.file.tables[self.table].sets.scores_of(self.stored)
 
 
 def estimate_of(success: SuccessTable | None, members: tuple[int, ...]) -> SuccessEstimate | None:
