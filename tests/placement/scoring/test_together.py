@@ -15,7 +15,7 @@ from tcs.placement.robustness import Trials
 from tcs.placement.scoring import score, verify
 from tcs.placement.scoring.file_checker import FileChecker, Posture
 from tcs.placement.store import load_scores, save_scores
-from tcs.placement.tables import Reason
+from tcs.placement.tables import Reason, RefinedTable
 from tests.environments import write_environment
 from tests.two_arms import GRID, PAIR, write_pair
 
@@ -90,6 +90,30 @@ def test_drake_refuses_arms_that_touch(pair):
         )
     assert finding.contacts == contacts > 0
     assert not checker.check(h, 0, Posture(0, value + 0.01, q, other)).dexterity_error < 0.009
+
+
+def test_both_arms_of_a_refined_set_are_judged_at_once(pair):
+    scores = pair.nominal.scores
+    h = int(np.flatnonzero(scores.reached[:, 0])[0])
+    at = pair.configurations.values([h])
+    q = np.stack([scores.joints_of(h, goal) for goal in (0, 1)])[None, None]
+    for turned in (0.0, 1.2):
+        swung = q.copy()
+        swung[..., 1, 0] += np.float32(turned)
+        refined = RefinedTable(
+            origin=np.array([[h]], np.int32),
+            values=np.stack([at[axis.name] for axis in pair.configurations.axes], axis=1)[None],
+            reached=scores.reached[None, None, h],
+            dexterity=scores.dexterity[None, None, h],
+            arm_joints=swung,
+            objective=np.zeros(1),
+            weights=scores.weights,
+            hand=scores.hand[None, None, h],
+        )
+        tables = (dataclasses.replace(pair.nominal, refined=refined),)
+        checker = FileChecker.of(dataclasses.replace(pair, tables=tables), jobs=1)
+        found = checker.refined(checker.refined_pairs(), lambda: None)
+        assert [finding.is_true for finding in found] == [not turned] * 2
 
 
 def test_both_arms_are_checked_against_each_other_off_the_grid_and_under_error(pair):
