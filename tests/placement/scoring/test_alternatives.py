@@ -80,10 +80,10 @@ def test_drake_finds_the_pose_that_the_joints_reach(file, environment, single):
     reached = np.flatnonzero(scores.reason[:, 0] == Reason.REACHED)
     for h in reached[:: max(1, len(reached) // 5)]:
         q = np.asarray(scores.joints_of(h, 0), dtype=np.float64)
-        assert both.check(h, 0, q, scores.dexterity[h, 0]).is_true
-        true_at_first.add(first.check(h, 0, q, scores.dexterity[h, 0]).is_true)
+        assert both.check_at(both.values(h), 0, q, scores.dexterity[h, 0]).is_true
+        true_at_first.add(first.check_at(first.values(h), 0, q, scores.dexterity[h, 0]).is_true)
         bent = q + np.eye(7)[5] * 1e-3
-        assert not both.check(h, 0, bent, scores.dexterity[h, 0]).is_true
+        assert not both.check_at(both.values(h), 0, bent, scores.dexterity[h, 0]).is_true
     assert true_at_first == {True, False}
 
 

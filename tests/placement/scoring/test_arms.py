@@ -146,7 +146,8 @@ def test_trials_and_motions_take_the_hand_of_each_goal(both, singles):
 
 def test_obstacles_block_the_solutions_of_each_arm(both):
     constraints = Constraints(blocked=(Obstacle.parse("0.75 -0.45 0.2 0.2 0 0.9 1.2"),))
-    found = admitted_candidates(constraints, HERE, SelectionTables.of(both))
+    tables = SelectionTables.of(both)
+    found = admitted_candidates(constraints, HERE, tables, tables.index)
     lost = both.nominal.sets.reached & ~found.reached
     assert {1, 2} == set(both.nominal.sets.served[lost].tolist())
     assert found.reached.any()

@@ -111,12 +111,14 @@ def test_obstacles_block_the_solutions_of_each_hand(hands, corner, tmp_path):
         load_job(write_task(tmp_path, GOALS), corner, "pr2")
     sets = hands.nominal.sets
     box = Obstacle.parse("0.75 -0.45 0.2 0.2 0 0.9 1.2")
-    found = admitted_candidates(Constraints(blocked=(box,)), HERE, SelectionTables.of(hands))
+    constraints, tables = Constraints(blocked=(box,)), SelectionTables.of(hands)
+    found = admitted_candidates(constraints, HERE, tables, tables.index)
     assert not np.array_equal(found.reached, sets.reached)
     for numbers in hands.goals_of_hands:
         goals = [{k: v for k, v in GOALS[g].items()} for g in numbers]
         alone = score(write_task(tmp_path, goals), corner, "pr2", approach=False)
-        of_hand = admitted_candidates(Constraints(blocked=(box,)), HERE, SelectionTables.of(alone))
+        tables = SelectionTables.of(alone)
+        of_hand = admitted_candidates(constraints, HERE, tables, tables.index)
         rows = np.searchsorted(sets.candidates, alone.nominal.sets.candidates)
         np.testing.assert_array_equal(found.reached[np.ix_(rows, numbers)], of_hand.reached)
 
