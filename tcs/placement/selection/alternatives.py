@@ -42,7 +42,7 @@ class Top:
             raise SelectionError(f"min_apart is {self.min_apart!r}; must be 0 to 40 m.")
 
 
-class Placed(Protocol):
+class CandidatePlaces(Protocol):
     """Candidates with their base cells and states of the environment, e.g. a set table."""
 
     @property
@@ -66,7 +66,7 @@ class Distinct:
     other, or if their members need different states of the environment.
     """
 
-    candidates: Placed
+    candidates: CandidatePlaces
     min_apart: float
     offered: Sequence[Sequence[int]]
     """Candidate numbers of the members of each."""
