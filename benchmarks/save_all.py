@@ -36,6 +36,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     ),
     "planning": ("--limit", "20", "--compared", "1", "--seeds", "20"),
     "service": (f"{SCORES}/shaving-wheelchair-pr2.tcs",),
+    "service_strain": (f"{SCORES}/shaving-wheelchair-pr2.tcs", "--seconds", "4"),
     "ros2": (f"{SCORES}/shaving-wheelchair-pr2.tcs",),
     "app": (f"{SCORES}/shaving-wheelchair-pr2.tcs",),
     "approach": (
