@@ -8,12 +8,13 @@ that arrives at its limit resting there. Through each posture leads one of them.
 
 from __future__ import annotations
 
+import numpy as np
+
 from tcs.kernel.analytic.ik import within
 from tcs.kernel.approach.curve import MOST, finish_spline, is_too_fast, spline_is_free
 from tcs.kernel.approach.grid import NOWHERE, PIECES
 from tcs.kernel.approach.memory import AnyApproach, Approach
 from tcs.kernel.approach.opening import end_of_window
-from tcs.kernel.approach.rates import are_kept, slow_down
 from tcs.kernel.approach.scene import pair_contact_code
 from tcs.kernel.approach.turns import place_sample
 from tcs.kernel.arrays import FloatArray
@@ -32,8 +33,12 @@ from tcs.kernel.motion.straight import (
     release_joints,
     tangent_where_evaluated,
 )
+from tcs.kernel.numeric.newton import null_space_direction
 from tcs.kernel.problem import Problem
 
+LEAST_SHARE = 1e-3
+"""Least share of a joint in the motion that leaves the tool where it is, for its rate to be
+changed by that."""
 AT_GOAL = int_constant(0)
 """Number of the point of a spline at the goal."""
 PER_LEVEL = MOST // PIECES
@@ -101,8 +106,8 @@ def _lead(
             if not tangent_where_evaluated(scene, line, offset, slopes[n]):
                 return LIMITS
             before, begin = n, points[n]
-            if not are_kept(fastest, slopes[n]):
-                if not slow_down(line, fastest, slopes[n]):
+            if not _are_kept(fastest, slopes[n]):
+                if not _slow_down(line, fastest, slopes[n]):
                     return LIMITS
                 begin = ahead
                 for k in range(7):
@@ -246,3 +251,42 @@ def _next_window(approach: Approach, b: int, level: int, column: int) -> tuple[i
     while end < last and is_open[end + 1]:
         end += 1
     return first, end
+
+
+@inner
+def _are_kept(fastest: FloatArray, rates: FloatArray) -> bool:
+    """Return whether no joint exceeds its greatest rate."""
+    for k in range(7):
+        if abs(rates[k]) > fastest[k]:
+            return False
+    return True
+
+
+@inner
+def _slow_down(line: StraightWorkspace, fastest: FloatArray, rates: FloatArray) -> bool:
+    """Let the joint that is the most too fast move at its limit; return whether all keep theirs.
+
+    A redundant arm has a motion that leaves the tool where it is. As much of it is added as that
+    joint needs.
+
+    Args:
+        line: Holds the factor at the posture; `q` is scratch.
+        fastest: Greatest rate of each joint [rad], shape (7,).
+        rates: Derivatives of the joints by the fraction of the line [rad], shape (7,); changed.
+    """
+    worst, fast = 1.0, 0
+    for k in range(7):
+        if abs(rates[k]) > worst * fastest[k]:
+            worst, fast = abs(rates[k]) / fastest[k], k
+    alone, along = line.q, line.newton.step
+    for k in range(7):
+        alone[k] = 1.0 if k == fast else 0.0
+    share = null_space_direction(line.newton, alone, along)
+    if share < LEAST_SHARE:
+        return False
+    limit = np.copysign(fastest[fast], rates[fast])
+    change = (limit - rates[fast]) / share
+    for k in range(7):
+        rates[k] += change * along[k]
+    rates[fast] = limit
+    return _are_kept(fastest, rates)
