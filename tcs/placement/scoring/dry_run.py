@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple
 
@@ -56,12 +56,18 @@ class Estimate:
         return asdict(self)
 
 
-def estimate(setups: Sequence[ScoringSetup], *, slices: int = SAMPLES) -> Estimate:
+def estimate(
+    setups: Sequence[ScoringSetup],
+    *,
+    on_compile: Callable[[], None] | None = None,
+    slices: int = SAMPLES,
+) -> Estimate:
     """Estimate what scoring the jobs of some hands into one file would take.
 
     Args:
         setups: The job of each hand, with its scene; the time is that of one thread divided by
             their number of threads. Forbidden regions are not subtracted.
+        on_compile: Called before the kernel compiles, if it has to.
         slices: Greatest number of slices to score.
     """
     found = []
@@ -71,7 +77,7 @@ def estimate(setups: Sequence[ScoringSetup], *, slices: int = SAMPLES) -> Estima
         problem = build_problem(lowered.arrays, setup.measure)
         is_scored = setup.approach.is_scored
         scorer = ApproachScorer(problem, approach_lines(job)) if is_scored else None
-        warm_up(problem, approaches=scorer)
+        warm_up(problem, on_compile, scorer)
         work = Work(Scorer.of(problem), lowered.grid)
         size = job.scored_grid.size
         starts = np.unique(np.linspace(0, max(0, size - SLICE), slices).astype(int))

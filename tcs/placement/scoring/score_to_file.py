@@ -181,7 +181,7 @@ def estimate_all(
             setups = load_setups(
                 name, where, robot, measure=measure, jobs=jobs, sets=sets, **options
             )
-            found.append(estimate(setups))
+            found.append(estimate(setups, on_compile=on_compile))
         else:
             scorer = LiveScorer(
                 name, where, robot, measure=measure, jobs=jobs, on_compile=on_compile, **sets,
