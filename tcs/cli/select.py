@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -17,7 +17,9 @@ from tcs.output.terminal import tables
 
 if TYPE_CHECKING:
     from tcs.kernel.arrays import FloatArray
+    from tcs.placement.reasons import Explanation
     from tcs.placement.selection import UtilityWeights
+    from tcs.placement.store import ScoreFile
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -254,4 +256,21 @@ def explain(
 
         explanation = explained_by_arm(explanation, arm)
     result = explanation_in_words(loaded, explanation)
+    if not explanation.distribution.reached:
+        result["missing"] = _missing(loaded, explanation)
     terminal.print_result(result, report_explanation, as_json=as_json)
+
+
+def _missing(file: ScoreFile, explanation: Explanation) -> list[dict[str, Any]] | None:
+    """Return what would make a goal reached that nothing reaches; None where the models changed."""
+    from tcs.errors import TcsError
+    from tcs.placement.refinement.missing import what_is_missing
+
+    try:
+        found = what_is_missing(
+            file, explanation.goal, explanation.match.index, on_compile=terminal.note_compiling
+        )
+    except TcsError as error:
+        terminal.note(f"what is missing cannot be computed: {error}")
+        return None
+    return [remedy.to_json() for remedy in found]

@@ -146,6 +146,9 @@ def _print_unreached(out: Console, result: Mapping[str, Any]) -> None:
         f"No configuration of the grid reaches it. {farthest['stopped']:,} passed the most checks: "
         f"{REASON_TEXTS[reason_of(farthest['reason'])]}{often}."
     )
+    remedies = [remedy["words"] for remedy in result.get("missing") or ()]
+    if remedies:
+        out.print(f"It would be reached {', or '.join(remedies)}.")
 
 
 def _print_reasons(out: Console, result: Mapping[str, Any]) -> None:
