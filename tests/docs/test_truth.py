@@ -54,8 +54,8 @@ def test_top_level_of_a_score_file():
 
 def test_json_of_an_explanation():
     listed = names(rows(page("explaining"), "| key | value |"))
-    # The command adds the name of the measure.
-    assert sorted(listed) == sorted([*explain(score_file(), 0).to_json(), "measure"])
+    # The command adds the name of the measure, and what is missing where nothing reaches the goal.
+    assert sorted(listed) == sorted([*explain(score_file(), 0).to_json(), "measure", "missing"])
 
 
 def test_costs_of_changes():
