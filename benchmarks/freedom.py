@@ -1,7 +1,7 @@
 """Recall of goals with freedom, against a dense scan of the freedom.
 
 Usage: python benchmarks/freedom.py [--robots pr2,jaco] [--freedoms rotation,"cone of 20"]
-           [--configurations 1000] [--seed 0]
+           [--configurations 1000] [--seed 0] [--rows TASK:ENVIRONMENT:ROBOT,...] [--refusals 200]
 
 The goals are those of *shaving* in the wheelchair, each with a freedom. Every pair of randomly
 drawn initial configurations and goals is scored; those unreached, but for configurations whose
@@ -11,6 +11,10 @@ search over the freedom; what the search of the arm at one pose misses is measur
 At some of the pairs reached, the best pose of the scan is compared: how much of its dexterity the
 pose has that the search found. The same configurations are scored at the nominal poses, in turn.
 The results depend on the seed alone; times are processor times of one thread, the least of two.
+
+With `--rows` tasks are scored as they ship, with approach, and it is asked what their freedom
+misses: of pairs refused, drawn at random, half of them for their approach, such poses are scored as
+goals of their own, each with its approach. A pair is missed if one of these can be approached.
 """
 
 from __future__ import annotations
@@ -19,6 +23,7 @@ import argparse
 import math
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from table import cell, header, parser, row, save
@@ -30,7 +35,10 @@ from tcs.kernel.sweep import score
 from tcs.kernel.verification.scans import at_poses
 from tcs.model.tasks import Freedom, Task, load_task
 from tcs.placement.robustness.statistics import binomial_interval
-from tcs.placement.scoring import load_job
+from tcs.placement.scoring import load_job, sweep
+from tcs.placement.scoring.approaches import ApproachScorer, approach_lines
+from tcs.placement.scoring.scorer import Scorer
+from tcs.placement.tables import Reason
 
 TASK, ENVIRONMENT = "shaving", "wheelchair"
 FREEDOMS = {
@@ -44,6 +52,10 @@ FREEDOMS = {
 """The freedom of every goal by the name of it in a task: `rotation` is `rotation_about` x."""
 COMPARED = 40
 """Most pairs of a goal whose dexterity is compared with that of the scan."""
+APPROACH = (Reason.APPROACH_LIMITS, Reason.APPROACH_BLOCKED)
+"""Reasons of pairs that a posture reaches."""
+DECIDED = (REACHED, BODY_BLOCKED, Reason.EXCLUDED, Reason.TOO_FAR, *APPROACH)
+"""Reasons of other pairs that a pose of the freedom cannot change, and those of approaches."""
 ANY_GOAL = (REACHED, BODY_BLOCKED)
 """Reasons that no scan of a goal can change."""
 
@@ -55,6 +67,8 @@ def main() -> None:
     command_line.add_argument("--freedoms", default="rotation,orientation")
     command_line.add_argument("--configurations", type=int, default=1000)
     command_line.add_argument("--seed", type=int, default=0)
+    command_line.add_argument("--rows", help="rows to measure instead, with approach")
+    command_line.add_argument("--refusals", type=int, default=200)
     options = command_line.parse_args()
     unknown = [name for name in options.freedoms.split(",") if name not in FREEDOMS]
     if unknown:
@@ -63,6 +77,11 @@ def main() -> None:
         )
     header()
     row("seed", str(options.seed))
+    if options.rows:
+        for name in options.rows.split(","):
+            approachable(*name.split(":"), options)
+        save(options, keep=True)
+        return
     for robot in options.robots.split(","):
         for freedom in options.freedoms.split(","):
             recall(robot, freedom, options)
@@ -124,6 +143,43 @@ def recall(robot: str, freedom: str, options: argparse.Namespace) -> None:
     for column, text in values.items():
         row(f"{name}: {column}", text)
         cell("recall", name, column, text)
+
+
+def approachable(task: str, environment: str, robot: str, options: argparse.Namespace) -> None:
+    """Score a row with approach and scan some of its refusals; print and record what was found."""
+    job = load_job(task, environment, robot)
+    lowered = job.lowered(job.scene())
+    lines = approach_lines(job)
+    swept = sweep(lowered, job.task.weights, approaches=lines, tables=job.tables)
+    reasons = np.concatenate([table.reason for table in swept.tables])
+    problem, draw = build_problem(lowered.arrays), np.random.default_rng(options.seed)
+    strata = {
+        "for the approach": np.argwhere(np.isin(reasons, APPROACH)),
+        "otherwise": np.argwhere(~np.isin(reasons, DECIDED)),
+    }
+    reached = int(np.count_nonzero(reasons == REACHED))
+    values, lost = {"approachable": f"{reached:,}"}, 0.0
+    for stratum, pairs in strata.items():
+        looked_at = draw.permutation(pairs)[: options.refusals // 2]
+        missed = 0
+        for configuration, goal in looked_at:
+            at = rows_at(lowered.grid, [configuration])
+            posed = at_poses(problem, int(at.state[0]), int(goal))
+            count = posed.goals.number
+            of_poses = type(lines)(*(np.repeat(v[goal : goal + 1], count, axis=0) for v in lines))
+            found = Scorer.of(posed, ApproachScorer(posed, of_poses)).score(at)
+            if (found.reason == REACHED).any():
+                missed += 1
+                reason = Reason(reasons[configuration, goal]).name
+                print(f"missed: configuration {configuration}, goal {goal}, {reason}", flush=True)
+        lost += missed * len(pairs) / max(len(looked_at), 1)
+        values[f"refused {stratum}"] = f"{len(pairs):,}"
+        values[f"missed, {stratum}"] = f"{missed} of {len(looked_at)}"
+    values["recall"] = f"{reached / (reached + lost):.4f}"
+    name = f"{Path(task).stem}, {environment}, {robot}"
+    for column, text in values.items():
+        row(f"{name}: {column}", text)
+        cell("approach", name, column, text)
 
 
 def free_task(freedom: Freedom) -> Task:
