@@ -66,16 +66,26 @@ def score(
             "jlwki, the isotropy with the joints weighted by their distance to their limits."
         ),
     ] = "isotropy",
-    approach: Annotated[
-        bool | None,
+    paper: Annotated[
+        bool,
         typer.Option(
-            "--approach/--no-approach",
-            help="Count a goal as reached only if a posture there can be approached: backwards "
-            "along the goal's straight line, within the limits, touching nothing; or, as in the "
-            "papers, if any posture reaches it.",
-            show_default="with approach where it can be scored",
+            "--paper",
+            help="Score as the papers do: each goal at its exact pose, whatever else the task says "
+            "serves as well, by any posture, whether or not it can be approached; and count "
+            "contacts of the body as they do in what follows.",
         ),
-    ] = None,
+    ] = False,
+    approach: Annotated[
+        bool,
+        typer.Option(
+            "--approach",
+            help="Refuse tasks and robots whose approaches cannot be scored. A goal counts as "
+            "reached only if a posture there can be approached: backwards along the goal's "
+            "straight line, within the limits, touching nothing.",
+            show_default="scored with approach where it can be",
+        ),
+    ] = False,
+    no_approach: Annotated[bool, typer.Option("--no-approach", hidden=True)] = False,
     refine: Annotated[
         bool,
         typer.Option("--refine", help="Then refine the best sets between the grid points."),
@@ -148,6 +158,11 @@ def score(
         raise typer.BadParameter("give a task, or --all for all tasks.", param_hint="TASK")
     if task is None and (observed or frames):
         raise typer.BadParameter("requires one task, not --all.", param_hint="--observed")
+    if approach and (paper or no_approach):
+        other = "--paper" if paper else "--no-approach"
+        raise typer.BadParameter(
+            f"cannot be combined with {other}, which scores without.", param_hint="--approach"
+        )
     kept = options.block_folder(blocks, restart)
     if refine and dry_run:
         raise typer.BadParameter("requires scores, not --dry-run.", param_hint="--refine")
@@ -176,7 +191,8 @@ def score(
     }
     scoring_options: dict[str, Any] = {
         "measure": measure,
-        "approach": approach,
+        "paper": paper,
+        "approach": True if approach else False if no_approach else None,
         "rule": rules,
         "same_environment": same_environment,
         "max_members": max_members,

@@ -145,6 +145,7 @@ class ScoreRequest(Limited):
     arms: Text | None = None
     measure: Text = "isotropy"
     approach: Annotated[bool, Field(strict=True)] | None = None
+    paper: Annotated[bool, Field(strict=True)] = False
     rules: Text = "paper"
     same_environment: Annotated[bool, Field(strict=True)] = False
     max_members: Annotated[int, Field(strict=True, ge=1, le=3)] = 2

@@ -17,7 +17,7 @@ from tcs.placement.constraints import Constraints, recorded_constraints
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.offline import load_setups, score_setups
 from tcs.placement.scoring.rebuild import recorded_jobs
-from tcs.placement.store import APPROACH, ARMS, ScoreFile
+from tcs.placement.store import APPROACH, ARMS, PAPER, ScoreFile
 from tcs.service.conversions import regions_of, settings_of
 from tcs.service.jobs import Progress
 from tcs.service.requests import RescoreRequest
@@ -70,7 +70,7 @@ class Rescorer:
             measure=file.metadata["measure"], jobs=self._threads,
             sets={"max_members": request.max_members}, constraints=Constraints(forbid=forbid),
             approach=APPROACH in file.metadata, build=self._scene_of,
-            arms=file.metadata.get(ARMS),
+            arms=file.metadata.get(ARMS), paper=PAPER in file.metadata,
         )  # fmt: skip
         return score_setups(
             setups, begun=begun, on_progress=progress, on_compile=progress.compiling

@@ -201,6 +201,7 @@ class SceneWork:
         return {
             "measure": request.measure,
             "approach": request.approach,
+            "paper": request.paper,
             "rule": request.rules,
             "same_environment": request.same_environment,
             "max_members": request.max_members,

@@ -456,6 +456,28 @@ def test_goals_with_freedom_are_scored_with_approach(tcs_command, tmp_path):
     assert "approach" not in tcs.load(path).metadata
 
 
+def test_scoring_as_in_the_papers(tcs_command, corner, tmp_path):
+    path = tmp_path / "out.tcs"
+    task = Path(__file__).parents[2] / "examples" / "feeding_from_any_side.yaml"
+    words = ("score", task, "--environment", corner, "--out", path, "--paper")
+    ran = tcs_command(*words)
+    assert "as in the papers: each goal at its exact pose, without approach" in ran.out
+    assert ran.err.count("without approach") == 0
+    file = tcs.load(path)
+    assert file.metadata["paper"] is True
+    assert not any("free" in goal for goal in file.task["goals"])
+    result = tcs_command(*words, "--json").json
+    assert (result["paper"], result["approach"], result["no_approach"]) == (True, None, None)
+    assert tcs_command(*words, "--no-approach", "--json").json["reasons"] == result["reasons"]
+
+
+@pytest.mark.parametrize("other", ["--paper", "--no-approach"])
+def test_approach_excludes_scoring_without(tcs_command, other):
+    ran = tcs_command("score", "shaving", "--approach", other)
+    assert ran.code == 2
+    assert f"cannot be combined with {other}" in " ".join(ran.err.split())
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("blocks", [(), ("--blocks", "blocks")], ids=["file", "blocks"])
 def test_a_full_disk_is_told_in_one_line_and_leaves_nothing(corner, tmp_path, blocks):

@@ -295,6 +295,14 @@ class Task:
         several = any(goal.alternatives for goal in self.goals)
         return several or any(free is not None for free in frees)
 
+    def exact(self) -> Task:
+        """Return the task with each goal at its own pose alone, as the papers score tasks."""
+        return replace(
+            self,
+            goals=tuple(replace(goal, free=None, alternatives=()) for goal in self.goals),
+            surfaces=tuple(replace(surface, free=None) for surface in self.surfaces),
+        )
+
     def grid_changes(self, environment: str) -> Mapping[str, Mapping[str, object]]:
         """Return the changes to the axes of an environment's grid, empty if there are none."""
         return self.grids.get(environment, {})

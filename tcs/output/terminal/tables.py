@@ -119,6 +119,8 @@ def report_scores(result: Mapping[str, Any]) -> None:
         f"{result['scoring_seconds']:.2f} s; {result['candidates']:,} {candidates}, "
         f"{result['sets']:,} sets kept."
     )
+    if result["paper"]:
+        out.print("scored as in the papers: each goal at its exact pose, without approach.")
     if result["approach"] is not None:
         out.print(_approach_text(result["approach"]))
     if result["ik"] == "numeric":
@@ -162,8 +164,7 @@ def _approach_text(found: Mapping[str, Any]) -> str:
     pairs = found["approachable"] + found["limits"] + found["blocked"]
     return (
         f"scored with approach: of {pairs:,} pairs that a posture reaches, "
-        f"{found['approachable']:,} ({percentage(found['fraction'])}) can be approached "
-        "(--no-approach counts all)."
+        f"{found['approachable']:,} ({percentage(found['fraction'])}) can be approached."
     )
 
 

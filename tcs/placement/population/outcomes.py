@@ -210,6 +210,8 @@ def _with_papers_man(hand: HandTrials, trials: Trials) -> HandTrials:
     assert person is not None
     environment = spec.environment.model_copy(update={"person": person.without_body()})
     task = load_task(trials.file.metadata["task"])
+    if hand.job.paper:
+        task = task.exact()
     if len(trials.hands) > 1:
         goals = tuple(task.goals[goal] for goal in hand.goals)
         task = dataclasses.replace(hand.job.task, goals=goals)

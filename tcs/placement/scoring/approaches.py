@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -70,21 +70,26 @@ class ApproachChoice:
         return {WITHOUT_APPROACH: self.hindrance} if self.hindrance else {}
 
 
-def choose_approach(wanted: bool | None, jobs: Iterable[Job]) -> ApproachChoice:
+def choose_approach(wanted: bool | None, jobs: Sequence[Job]) -> ApproachChoice:
     """Return whether goals are scored with their approaches.
 
     Args:
-        wanted: Whether they should be; None for wherever all of them can be.
+        wanted: Whether they should be; None for wherever all of them can be, in the papers' way
+            nowhere.
         jobs: The job of each arm or hand.
 
     Raises:
-        ArmClassError: If they should be and cannot.
+        ArmClassError: If they should be and cannot, or the jobs are scored as in the papers.
     """
-    if wanted is False:
+    if wanted and any(job.paper for job in jobs):
+        raise ArmClassError(
+            "The papers score no approach. Leave out 'approach', or score without 'paper'."
+        )
+    if wanted is False or any(job.paper for job in jobs):
         return ApproachChoice(False)
     hindrance = next(filter(None, map(approach_hindrance, jobs)), "")
     if hindrance and wanted:
-        raise ArmClassError(f"{hindrance}. Score the task without approach (--no-approach).")
+        raise ArmClassError(f"{hindrance}. Leave out 'approach': it is then scored without.")
     return ApproachChoice(not hindrance, hindrance)
 
 

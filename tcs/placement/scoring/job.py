@@ -61,6 +61,9 @@ class JobOptions(TypedDict, total=False):
     arms: str | None
     """Arm of goals that name none: one of the robot's, "both" for any of them, or None for the one
     that the robot file describes."""
+    paper: bool
+    """Whether each goal is its own pose alone, as in the papers; by default what the task lets
+    free serves as well."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -86,6 +89,8 @@ class Job:
     """Joints of the arm that works at the same time, which the scores of this one leave out."""
     any_arm: bool = False
     """Whether goals that name no arm may be reached by any."""
+    paper: bool = False
+    """Whether the task is the exact one, scored as in the papers."""
 
     @property
     def scored_grid(self) -> Grid:
@@ -183,6 +188,9 @@ def load_jobs(
         SelectionError: If the present value of an axis to keep is missing or not scored.
     """
     task = task if isinstance(task, Task) else load_task(task)
+    paper = options.get("paper", False)
+    if paper:
+        task = task.exact()
     if not isinstance(environment, EnvironmentFile):
         environment = load_environment(environment)
     person = options.get("person")
@@ -223,6 +231,7 @@ def load_jobs(
                 goal_numbers=() if len(by_hand) == 1 else numbers,
                 other_joints=other_joints,
                 any_arm=bool(own),
+                paper=paper,
             )
         )
     return tuple(jobs)

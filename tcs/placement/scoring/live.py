@@ -59,6 +59,7 @@ class LiveScorer:
         now: Mapping[str, float] | None = None,
         person: PersonLike | None = None,
         approach: bool | None = None,
+        paper: bool = False,
         arms: str | None = None,
         **sets: Unpack[SetOptions],
     ) -> None:
@@ -77,6 +78,7 @@ class LiveScorer:
             now: Present values of axes [m or rad], for the axes that the constraints keep.
             person: Whose body the person has, as for `tcs.score`.
             approach: As for `tcs.score`.
+            paper: As for `tcs.score`.
             arms: As for `tcs.score`.
             **sets: Options of the kept sets.
 
@@ -86,6 +88,7 @@ class LiveScorer:
         self._setups = load_setups(
             task, environment, robot, measure=measure, jobs=jobs, sets=sets, only=only,
             constraints=constraints, now=now, person=person, approach=approach, arms=arms,
+            paper=paper,
         )  # fmt: skip
         self._scene_in_use = threading.Lock()
         for setup in self._setups:
@@ -200,6 +203,7 @@ def score_observed(
     now: Mapping[str, float] | None = None,
     person: PersonLike | None = None,
     approach: bool | None = None,
+    paper: bool = False,
     arms: str | None = None,
     **sets: Unpack[SetOptions],
 ) -> ScoreFile:
@@ -218,6 +222,7 @@ def score_observed(
         now: Present values of axes [m or rad], for the axes that the constraints keep.
         person: Whose body the person has, as for `tcs.score`.
         approach: As for `tcs.score`.
+        paper: As for `tcs.score`.
         arms: As for `tcs.score`.
         **sets: Options of the kept sets.
 
@@ -229,6 +234,6 @@ def score_observed(
     """
     scorer = LiveScorer(
         task, environment, robot, measure=measure, jobs=jobs, constraints=constraints, now=now,
-        person=person, approach=approach, arms=arms, **sets,
+        person=person, approach=approach, paper=paper, arms=arms, **sets,
     )  # fmt: skip
     return scorer.score(observation)

@@ -38,7 +38,7 @@ from tcs.placement.scoring.person import person_entry
 from tcs.placement.scoring.sets import SetOptions, checked_options, kept_sets
 from tcs.placement.scoring.sweep import sweep
 from tcs.placement.scoring.together import Hands, together
-from tcs.placement.store import ARMS, HANDS, OF_HAND, ScoreFile, StateTables
+from tcs.placement.store import ARMS, HANDS, OF_HAND, PAPER, ScoreFile, StateTables
 from tcs.placement.store.robot_shapes import Primitives, RobotShapes
 from tcs.placement.tables import Reason, ScoreTable
 
@@ -162,6 +162,7 @@ class ScoringSetup:
                 "program_version": version("tcs"),
                 "created": datetime.now(UTC).isoformat(timespec="seconds"),
                 **self.references,
+                **({PAPER: True} if job.paper else {}),
                 **({"only": list(job.constraints.only)} if job.constraints.only else {}),
                 **entries,
                 # Once for all hands and arms, with the goals as the file numbers them.
@@ -199,6 +200,7 @@ def score(
     now: Mapping[str, float] | None = None,
     person: PersonLike | None = None,
     approach: bool | None = None,
+    paper: bool = False,
     blocks: BlockFolder | None = None,
     engine: ScoringEngine | None = None,
     **sets: Unpack[SetOptions],
@@ -231,6 +233,9 @@ def score(
             along the goal's approach. The best of these gives joints and dexterity. By default
             wherever approaches can be scored: goals that one arm reaches at a time, and known
             velocity limits. Elsewhere the file records why not (`no_approach`).
+        paper: Score as the papers do: each goal at its own pose alone, whatever the task lets free,
+            and without approach. The file records it (`paper`), and what is done with it later
+            counts contacts of the body as the papers do.
         blocks: Folder in which finished blocks of the grid are kept, so that the same call
             continues after the process was killed; see `tcs.placement.scoring.BlockFolder`.
         engine: Who scores: `Threads` or `Dask` of `tcs.placement.scoring.engines`; by
@@ -251,13 +256,13 @@ def score(
         SelectionError: If the present value of an axis to keep is missing or not scored, or every
             base pose is forbidden.
         TcsError: If an option of the sets is out of range, or the workers of the engine are lost.
-        ArmClassError: If `approach` is requested where it cannot be scored.
+        ArmClassError: If `approach` is requested where it cannot be scored, or with `paper`.
         OutputError: If blocks cannot be kept in their folder, or another process is at work there.
     """
     begun = time.perf_counter()
     setups = load_setups(
         task, environment, robot, measure=measure, jobs=jobs, sets=sets, approach=approach,
-        arms=arms, only=only, constraints=constraints, now=now, person=person,
+        arms=arms, only=only, constraints=constraints, now=now, person=person, paper=paper,
     )  # fmt: skip
     setups = tuple(replace(setup, blocks=blocks, engine=engine) for setup in setups)
     return score_setups(setups, begun=begun, on_progress=on_progress, on_compile=on_compile)

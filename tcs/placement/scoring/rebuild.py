@@ -13,14 +13,14 @@ from tcs.placement.constraints import recorded_constraints
 from tcs.placement.scoring.hands import digest_of_hands
 from tcs.placement.scoring.job import Job, load_jobs
 from tcs.placement.scoring.person import recorded_person
-from tcs.placement.store import ARMS, PERSON, ScoreFile
+from tcs.placement.store import ARMS, PAPER, PERSON, ScoreFile
 
 _MADE_FROM = ("task", "environment", "robot", "scene_digest")
 
 
 def made_from(file: ScoreFile) -> dict[str, Any]:
     """Return what identifies the scene of a score file, as plain containers."""
-    optional = [key for key in ("only", "constraints", PERSON, ARMS) if key in file.metadata]
+    optional = [key for key in ("only", "constraints", PERSON, ARMS, PAPER) if key in file.metadata]
     return {
         **{key: file.metadata[key] for key in (*_MADE_FROM, *optional)},
         "observed": file.observed,
@@ -44,6 +44,7 @@ def recorded_jobs(record: Mapping[str, Any]) -> tuple[Job, ...]:
         constraints=recorded_constraints(record),
         person=recorded_person(record),
         arms=record.get(ARMS),
+        paper=bool(record.get(PAPER)),
     )
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from tcs.placement.constraints import constraint_texts
 from tcs.placement.scoring.kernel_start import ANALYTIC
-from tcs.placement.store import APPROACH, WITHOUT_APPROACH, ScoreFile, state_to_json
+from tcs.placement.store import APPROACH, PAPER, WITHOUT_APPROACH, ScoreFile, state_to_json
 
 
 def summary(file: ScoreFile) -> dict[str, Any]:
@@ -26,6 +26,7 @@ def summary(file: ScoreFile) -> dict[str, Any]:
         "measure": file.metadata["measure"],
         # Files without the entry were solved in closed form.
         "ik": file.metadata.get("ik", ANALYTIC),
+        "paper": PAPER in file.metadata,
         "approach": _approach_summary(file, reasons),
         "no_approach": file.metadata.get(WITHOUT_APPROACH),
         "configurations": pairs // goals,

@@ -52,6 +52,9 @@ OF_HAND = ("scene_digest", "robot_shapes", "ik", "self_contact")
 APPROACH, WITHOUT_APPROACH = "approach", "no_approach"
 """Entries of the metadata: how a file was scored with approach, or why it was not where nobody
 decided that."""
+PAPER = "paper"
+"""Entry of the metadata, true where a file was scored as the papers score tasks: each goal at its
+own pose alone, without approach; what is done with the file later counts contacts as they do."""
 
 MAX_TABLES = 1000
 """Greatest number of observed states in a file; the tables of one take some megabytes."""

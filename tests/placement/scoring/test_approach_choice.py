@@ -73,7 +73,7 @@ def test_all_arms_of_a_file_are_scored_with_approach_or_none(corner, slow_iiwa):
     choice = choose_approach(None, jobs)
     assert not choice.is_scored
     assert "'iiwa_joint_1'" in choice.hindrance
-    with pytest.raises(ArmClassError, match="--no-approach"):
+    with pytest.raises(ArmClassError, match="Leave out 'approach'"):
         choose_approach(True, jobs)
     assert choose_approach(False, jobs).entry == {}
 

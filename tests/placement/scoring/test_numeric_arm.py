@@ -68,7 +68,7 @@ def test_the_closed_form_is_recorded_without_a_note(capsys):
     figures = {
         "ik": "analytic", "configurations": 1, "goals": 1, "scoring_seconds": 0.1, "candidates": 0,
         "tile": 0.0, "sets": 0, "reasons": {}, "best_single": None, "best": None, "file": "x",
-        "pairs": 1, "approach": None, "recommended": None,
+        "pairs": 1, "paper": False, "approach": None, "recommended": None,
     }  # fmt: skip
     report_scores(figures)
     assert "Numeric" not in capsys.readouterr().out

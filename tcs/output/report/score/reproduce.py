@@ -9,7 +9,7 @@ from typing import Any
 
 from tcs.output.report.score.report import ScoreReport
 from tcs.placement.constraints import constraint_texts
-from tcs.placement.store import APPROACH, WITHOUT_APPROACH, ScoreFile, state_to_json
+from tcs.placement.store import APPROACH, PAPER, WITHOUT_APPROACH, ScoreFile, state_to_json
 
 PAPER_DISTANCE = 0.40
 """Default distance of two members [m], from the TCS paper."""
@@ -63,7 +63,9 @@ def score_command(report: ScoreReport) -> str:
     words += ["--max-members", str(sets.max_members)]
     if sets.same_environment:
         words.append("--same-environment")
-    if APPROACH in file.metadata:
+    if PAPER in file.metadata:
+        words.append("--paper")
+    elif APPROACH in file.metadata:
         words.append("--approach")
     elif WITHOUT_APPROACH not in file.metadata:
         words.append("--no-approach")
