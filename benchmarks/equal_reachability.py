@@ -46,7 +46,7 @@ def main() -> None:
         if not path.exists():
             path.parent.mkdir(parents=True, exist_ok=True)
             tcs.save(path, tcs.score(task, environment, ROBOT, jobs=options.jobs, approach=False))
-        trials = Trials.of(tcs.load(path))
+        trials = Trials.of(tcs.load(path), body_collisions="paper")
         sampling = {"samples": options.samples, "seed": options.seed, "jobs": options.jobs}
         for members in (1, 2):
             near, equal = (

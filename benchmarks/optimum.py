@@ -146,7 +146,7 @@ def refined_row(folder: Path, name: str) -> float:
     """Refine a row with the default options; return the processor time [s]."""
     file = tcs.load(path_of(folder, name, "scored"))
     begun = time.process_time()
-    refined = tcs.refine(file, jobs=1)
+    refined = tcs.refine(file, body_collisions="paper", jobs=1)
     spent = time.process_time() - begun
     tcs.save(path_of(folder, name, "refined"), refined)
     return spent
@@ -157,13 +157,13 @@ def judged_row(folder: Path, options: argparse.Namespace, name: str) -> dict[str
     file = tcs.load(path_of(folder, name, "scored"))
     refined = tcs.load(path_of(folder, name, "refined"))
     begun = time.process_time()
-    free = tcs.refine(file, keep_success=False, jobs=1)
+    free = tcs.refine(file, body_collisions="paper", keep_success=False, jobs=1)
     spent = time.process_time() - begun
-    robust = tcs.robustify(file, sets=400, samples=256, jobs=1)
+    robust = tcs.robustify(file, sets=400, samples=256, body_collisions="paper", jobs=1)
     begun = time.process_time()
-    surest = tcs.refine(robust, jobs=1, **SUREST)
+    surest = tcs.refine(robust, body_collisions="paper", jobs=1, **SUREST)
     on_success = time.process_time() - begun
-    trials = Trials.of(file)
+    trials = Trials.of(file, body_collisions="paper")
     samples = PerturbedPoints(trials, trials.errors.draw(options.samples, 0), 1)
     table = robust.nominal.success
     assert table is not None

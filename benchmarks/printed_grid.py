@@ -74,7 +74,13 @@ def best_under_error(
 ) -> Evaluation:
     """Return the evaluation of the best set of a task on a grid."""
     file = tcs.score(task, environment, "pr2", only=only, jobs=options.jobs, approach=False)
-    return evaluate(file, samples=options.samples, seed=options.seed, jobs=options.jobs)
+    return evaluate(
+        file,
+        samples=options.samples,
+        seed=options.seed,
+        jobs=options.jobs,
+        body_collisions="paper",
+    )
 
 
 if __name__ == "__main__":

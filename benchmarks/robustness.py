@@ -92,6 +92,7 @@ def estimated(task: str, environment: str, folder: Path, options: argparse.Names
         file,
         sets=options.sets,
         samples=options.set_samples,
+        body_collisions="paper",
         seed=options.seed,
         tables=[file.nominal_index],
         jobs=options.jobs,

@@ -57,7 +57,11 @@ def main() -> None:
                     task, nominal, "pr2", measure=measure, jobs=options.jobs, approach=False
                 )
                 found = evaluate(
-                    file, samples=options.samples, seed=options.seed, jobs=options.jobs
+                    file,
+                    samples=options.samples,
+                    seed=options.seed,
+                    jobs=options.jobs,
+                    body_collisions="paper",
                 )
                 cells.append(mean_and_std(found))
             rows.append(cells)

@@ -113,6 +113,7 @@ def estimate(path: Path, row: tuple[str, str], options: argparse.Namespace) -> N
             file,
             sets=SETS,
             samples=SAMPLES,
+            body_collisions="paper",
             seed=options.seed,
             tables=[file.nominal_index],
             jobs=options.jobs,

@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     from tcs.files.blocks import BlockFolder
     from tcs.model.grid import InitialConfiguration
     from tcs.model.scene import Observation
-    from tcs.motion import MotionPlan, examine, plan
+    from tcs.motion import MotionPlan, evaluate, examine, plan
     from tcs.placement.constraints import Constraints, Obstacle, Region
     from tcs.placement.population import Population, population
     from tcs.placement.reasons import Explanation, explain
     from tcs.placement.refinement import Placement, place, refine
-    from tcs.placement.robustness import Evaluation, evaluate, robustify
+    from tcs.placement.robustness import Evaluation, robustify
     from tcs.placement.scoring import (
         LiveScorer,
         Verification,
@@ -100,7 +100,7 @@ _HOMES = {
     "TravelWeights": ("tcs.placement.selection", "TravelWeights"),
     "UtilityWeights": ("tcs.placement.selection", "UtilityWeights"),
     "Verification": ("tcs.placement.scoring", "Verification"),
-    "evaluate": ("tcs.placement.robustness", "evaluate"),
+    "evaluate": ("tcs.motion", "evaluate"),
     "examine": ("tcs.motion", "examine"),
     "explain": ("tcs.placement.reasons", "explain"),
     "load": ("tcs.placement.store", "load_scores"),

@@ -42,7 +42,7 @@ def refine(
             "environment as the best set of the grid."
         ),
     ] = True,
-    body_collisions: BodyCollisions = "paper",
+    body_collisions: BodyCollisions = None,
     seed: options.Seed = 0,
     observed: options.Observed = None,
     jobs: options.Jobs = 2,

@@ -31,15 +31,13 @@ Delta = Annotated[
     ),
 ]
 BodyCollisions = Annotated[
-    str,
+    str | None,
     typer.Option(
-        metavar="paper|all|none",
+        metavar="all|paper|none",
         help="Collisions of base, torso, head and other arm with the environment that count in a "
-        "sample: all but those of the base with the furniture, as in the paper; all; or none.",
+        "sample: all; all but those of the base with the furniture, as in the paper; or none.",
+        show_default="all; paper in a file scored with --paper",
     ),
-]
-_CheckBase = Annotated[
-    bool, typer.Option("--check-base", help="The same as --body-collisions all.")
 ]
 
 
@@ -73,8 +71,7 @@ def evaluate(
         ),
     ] = None,
     observed: options.Observed = None,
-    body_collisions: BodyCollisions = "paper",
-    check_base: _CheckBase = False,
+    body_collisions: BodyCollisions = None,
     replan: Annotated[
         bool, typer.Option(help="Of a plan: whether motions are also planned anew in each sample.")
     ] = True,
@@ -86,12 +83,12 @@ def evaluate(
     """Evaluate the success of a set, or of a plan, in randomly perturbed environments."""
     if file.suffix == ".json":
         chosen = select != "best" or members or observed or blocks or restart
-        if chosen or check_base or body_collisions != "paper":
+        if chosen or body_collisions is not None:
             raise typer.BadParameter(
-                "of a plan, only --samples, --seed, --errors and --no-replan can be set.",
+                "of a plan, only --samples, --seed, --errors, --jobs and --no-replan can be set.",
                 param_hint="FILE",
             )
-        evaluate_plan_file(file, 100 if samples is None else samples, seed, errors, replan, as_json)
+        evaluate_plan_file(file, samples or 100, seed, errors, replan, jobs, as_json)
         return
     if members is not None and select not in ("uniform", "equal"):
         raise typer.BadParameter("requires --select uniform or equal.", param_hint="--members")
@@ -111,7 +108,7 @@ def evaluate(
             select=select,
             members=members or 2,
             table=table,
-            body_collisions="all" if check_base else body_collisions,
+            body_collisions=body_collisions,
             jobs=jobs,
             blocks=kept,
             on_progress=on_progress,
@@ -134,8 +131,7 @@ def robustify(
     seed: options.Seed = 0,
     errors: _Errors = None,
     observed: options.Observed = None,
-    body_collisions: BodyCollisions = "paper",
-    check_base: _CheckBase = False,
+    body_collisions: BodyCollisions = None,
     blocks: options.Blocks = None,
     restart: options.Restart = False,
     jobs: options.Jobs = 2,
@@ -161,7 +157,7 @@ def robustify(
             samples=samples,
             seed=seed,
             errors=errors,
-            body_collisions="all" if check_base else body_collisions,
+            body_collisions=body_collisions,
             tables=None if table is None else [table],
             jobs=jobs,
             blocks=kept,
@@ -174,20 +170,28 @@ def robustify(
 
 
 def evaluate_plan_file(
-    path: Path, samples: int, seed: int, errors: Path | None, replan: bool, as_json: bool
+    path: Path,
+    samples: int,
+    seed: int,
+    errors: Path | None,
+    replan: bool,
+    jobs: int,
+    as_json: bool,
 ) -> None:
     """Print whether the motions of a plan stay free in randomly perturbed environments."""
     from tcs.motion import evaluate_plan, load_plan
 
     plan = load_plan(path)
-    with terminal.progress_bar("samples") as on_progress:
+    with terminal.progress_bar("steps") as on_progress:
         found = evaluate_plan(
             plan,
             samples=samples,
             seed=seed,
             errors=errors,
             replan=replan,
+            jobs=jobs,
             on_progress=on_progress,
+            on_compile=terminal.note_compiling,
         )
     terminal.print_result(found.to_json(), set_tables.report_plan_success, as_json=as_json)
 

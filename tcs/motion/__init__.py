@@ -16,6 +16,7 @@ from tcs.motion.plan_check import PlanCheck, check_plan
 from tcs.motion.plan_files import save_plan
 from tcs.motion.plan_success import PlanSuccess, evaluate_plan
 from tcs.motion.plans import plan
+from tcs.motion.rooms import evaluate
 from tcs.motion.stops import Stop
 from tcs.motion.stored_plan import load_plan
 from tcs.motion.timing import Timed
@@ -36,6 +37,7 @@ __all__ = [
     "accesses",
     "check_approaches",
     "check_plan",
+    "evaluate",
     "evaluate_plan",
     "examine",
     "load_plan",

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from tcs.kernel.approach.regions import approach_spline
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.motion.goal_postures import postures_at
 from tcs.kernel.motion.straight import (
@@ -26,6 +28,9 @@ SPACING = 0.005
 SAMPLES = (96, 1000)
 """Numbers of angles of the free joint at which postures are solved: the second, where the first
 finds no approach."""
+REGION_SAMPLES, OF_POSE = 24, 4
+"""Angles of the free joint at another pose of a region, and the most accesses that are taken there:
+paths that fail lead past the person, where another roll of the hand helps more than the elbow."""
 MOST_ACCESSES = 16
 """Greatest number of postures kept for a goal, spread over those found."""
 
@@ -67,18 +72,27 @@ def accesses(stop: Stop, goal: int) -> Accesses:
     """Return postures at a goal that can be approached and left.
 
     The approach is followed backwards from postures at the goal and, where that fails, forwards
-    from postures before it: the two rarely rest the same joint at a limit.
+    from postures before it: the two rarely rest the same joint at a limit. Of a free goal, these
+    are postures at the pose where scoring reaches it, and at others of its region.
 
     Args:
         stop: The initial configuration.
         goal: Number of the goal.
     """
     search = _Search(stop, goal)
-    for samples in SAMPLES if stop.is_sampled else SAMPLES[:1]:
+    found = list(search.from_held())
+    sampled: list[Access] = []
+    for samples in SAMPLES if stop.is_sampled and not found else SAMPLES[:1]:
         for forwards in (False, True):
-            found = list(search.follow(samples, forwards=forwards))
-            if found:
-                return Accesses(_spread(stop, found), "", None)
+            sampled = sampled or list(search.follow(samples, forwards=forwards))
+    found += sampled
+    for pose in stop.region_in_arm_base(goal):
+        elsewhere = _Search(stop, goal, pose)
+        found += itertools.islice(elsewhere.follow(REGION_SAMPLES, forwards=False), OF_POSE)
+    if found:
+        # A hand may begin inside a box that paths keep out of.
+        outside = [access for access in found if _is_outside(stop, access)]
+        return Accesses(_spread(stop, outside or found), "", None)
     return search.nothing()
 
 
@@ -91,16 +105,30 @@ def first_accesses(stop: Stop, goal: int, samples: int) -> Iterator[Access]:
         samples: Number of angles of the free joint at which postures are solved.
     """
     search = _Search(stop, goal)
-    for forwards in (False, True):
-        yield from search.follow(samples, forwards=forwards)
+    found = itertools.chain(
+        search.from_held(), *(search.follow(samples, forwards=way) for way in (False, True))
+    )
+    return (access for access in found if _is_outside(stop, access))
+
+
+def _is_outside(stop: Stop, access: Access) -> bool:
+    """Return whether a path may begin and end where the straight motions do."""
+    if stop.motion is stop.lines:
+        return True
+    ends = [access.begin]
+    if not np.array_equal(access.begin, access.end):
+        ends.append(access.end)
+    return all(stop.contact_at(q) is None for q in ends)
 
 
 class _Search:
     """The search for the accesses of one goal."""
 
-    def __init__(self, stop: Stop, goal: int) -> None:
-        self.stop, self.goal = stop, stop.job.task.goals[goal]
-        self.R_AG, self.p_AG = stop.goal_in_arm_base(goal)
+    def __init__(
+        self, stop: Stop, goal: int, pose: tuple[FloatArray, FloatArray] | None = None
+    ) -> None:
+        self.stop, self.goal, self.number = stop, stop.job.task.goals[goal], goal
+        self.R_AG, self.p_AG = stop.goal_in_arm_base(goal) if pose is None else pose
         self.line = new_straight_workspace()
         self.outcomes = np.zeros(3, np.int64)
         # Where and how often bodies touch at postures at the goal, and before it.
@@ -124,6 +152,35 @@ class _Search:
                     away = self._retreat(curve, R_AT)
                     if away is not None:
                         yield Access(approach=curve, retreat=away)
+
+    def from_held(self) -> Iterator[Access]:
+        """Follow the approach from the posture at which scoring reaches the goal, if it is known.
+
+        Scoring found the approach with any motion of the arm's redundancy; the shortest is tried
+        first.
+        """
+        q = self.stop.held.get(self.number)
+        if q is None:
+            return
+        chain, grid = self.stop.problem.chain, self.stop.grid
+        R_AT, p_AT = np.empty((1, 3, 3)), np.empty((1, 3))
+        tool_poses(chain.R, chain.p, q[None], R_AT, p_AT)
+        line = self.goal.approach.reverse()
+        curve = self._next(self._search(q[None], R_AT[0], line, self.at_goal), line, 0)[1]
+        if curve is not None:
+            curve = curve.reverse()
+        else:
+            found = approach_spline(
+                self.stop.problem, grid.lines, self.stop.row, self.number, q, grid.around
+            )
+            if found is None:
+                return
+            knots = np.linspace(0.0, 1.0, len(found[0]))
+            fastest = TOOL_SPEED / self.goal.approach.distance
+            curve = Curve(knots, *found, fastest=fastest)
+        away = self._retreat(curve, R_AT[0])
+        if away is not None:
+            yield Access(approach=curve, retreat=away)
 
     def _by_direction(self, postures: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
         """Return postures with the same orientation of the tool, and that, shape (3, 3).

@@ -298,7 +298,7 @@ def _examine_stop(
         for goal in goals:
             outcomes[goal] = MotionOutcome.REST_BLOCKED, blocked
         return outcomes
-    reachable = _Reachable(stop)
+    reachable = ReachableGoals(stop)
     left = [goal for goal in goals if not reachable.has_quickly(goal)]
     for goal in goals:
         outcomes[goal] = MotionOutcome.DONE, None
@@ -307,13 +307,14 @@ def _examine_stop(
     return outcomes
 
 
-class _Reachable:
-    """The postures of one stop to which paths from rest were found.
+class ReachableGoals:
+    """The postures of one stop to which paths from rest were found, so that goals can be done.
 
     A path leads back as well, so any of them may begin a path to another goal.
     """
 
     def __init__(self, stop: Stop) -> None:
+        """Take a stop whose arm touches nothing at rest."""
         self.stop = stop
         self.postures = [stop.rest]
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from tcs.errors import TaskError
 from tcs.kernel.analytic.solver import is_outside
+from tcs.kernel.approach.regions import RegionPoses, is_region, region_poses
+from tcs.kernel.approach.scene import LineScene, approach_scene
+from tcs.kernel.approach.sweep import ApproachLines
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.motion.box_trees import grouped
 from tcs.kernel.motion.edges import posture_contact
@@ -19,6 +22,7 @@ from tcs.kernel.motion.scene import (
     NO_PAIR,
     MotionScene,
     MotionWorkspace,
+    arm_base,
     carriers,
     goal_from_arm_base,
     new_motion_workspace,
@@ -27,12 +31,13 @@ from tcs.kernel.motion.scene import (
     with_pairs,
 )
 from tcs.kernel.motion.search_trees import Trees, new_trees
+from tcs.kernel.postures import tool_poses
 from tcs.kernel.problem import Problem, build_problem
-from tcs.kernel.rows import rows_at
+from tcs.kernel.rows import Rows, rows_at
 from tcs.model.grid import Axis, Grid, InitialConfiguration
 from tcs.model.scene import LoweredScene, Scene, lower
 from tcs.motion.curves import CHAIN, in_chain
-from tcs.motion.free_goals import FreeGoalPoses
+from tcs.motion.free_goals import ScoredPostures
 from tcs.motion.keep_out import with_keep_out
 from tcs.placement.scoring.approaches import approach_lines
 from tcs.placement.scoring.job import Job
@@ -81,9 +86,8 @@ class StopGrid:
     """Velocity limits [rad/s], shape (7,)."""
     acceleration: FloatArray
     """Acceleration limits [rad/s^2], shape (7,)."""
-    poses: FreeGoalPoses | None = None
-    """Where in its freedom each goal is reached, the environment being where it is expected; None
-    if every goal is a single pose."""
+    scored: ScoredPostures | None = None
+    """Postures at which scoring reaches the goals; None if every goal is a single pose."""
     scenes: dict[int, tuple[MotionScene, MotionScene]] = field(default_factory=dict)
     """For each torso level met so far, the scenes of paths and of straight motions, with the
     environment in no particular place."""
@@ -110,11 +114,9 @@ class StopGrid:
         rates = np.array(job.spec.robot.arm_rates())
         # Those of joints that never move decide nothing.
         velocity, acceleration = in_chain(rates, 1.0)
-        poses = None
+        scored = None
         if job.task.has_freedom:
-            free = [bool(goal.region) for goal in job.task.goals]
-            problem = build_problem(lowered.arrays)
-            poses = FreeGoalPoses(problem, lowered.grid, free, approach_lines(job))
+            scored = ScoredPostures(build_problem(lowered.arrays), approach_lines(job))
         if job.task.keep_out:
             lowered = with_keep_out(lowered, job.task)
         return cls(
@@ -126,19 +128,31 @@ class StopGrid:
             rests=in_chain(np.array(list(job.spec.robot.rest_postures().values()))),
             velocity=velocity,
             acceleration=acceleration,
-            poses=poses,
+            scored=scored,
         )
 
-    def with_environment(self, lowered: LoweredScene) -> StopGrid:
-        """Return the same configurations with the shapes of the environment elsewhere.
+    @cached_property
+    def lines(self) -> ApproachLines:
+        """The approaches of the goals."""
+        return approach_lines(self.job)
 
-        Args:
-            lowered: The same scene lowered otherwise, without boxes that paths keep out of.
-        """
-        if self.job.task.keep_out:
-            lowered = with_keep_out(lowered, self.job.task)
-        problem = build_problem(lowered.arrays)
-        return replace(self, lowered=lowered, problem=problem)
+    @cached_property
+    def around(self) -> LineScene:
+        """The shapes around the straight motions, which take a tenth of a second to arrange."""
+        return approach_scene(self.problem)
+
+    @cached_property
+    def regions(self) -> tuple[RegionPoses | None, ...]:
+        """Some poses of the region of each goal; None of a goal that is a single pose."""
+        several = is_region(self.problem)
+        return tuple(
+            region_poses(self.problem, number) if goal.region and several else None
+            for number, goal in enumerate(self.job.task.goals)
+        )
+
+    def prepare(self) -> None:
+        """Arrange what all stops share, which threads would arrange at the same time."""
+        _ = self.lines, self.around, self.regions
 
     def stop(self, configuration: int, trees: Trees) -> Stop:
         """Return the stop at a configuration; the live scene stays as it is.
@@ -148,23 +162,37 @@ class StopGrid:
             trees: Memory of the planner, with its random state.
         """
         row = rows_at(self.lowered.grid, [configuration])
-        torso = int(row.torso[0])
-        if torso not in self.scenes:
-            self.scenes[torso] = self._scenes_at(torso)
-        paths, straight = self.scenes[torso]
+        held = {} if self.scored is None else self.scored.at(row)
+        return self.stop_at(row, trees, held, configuration)
+
+    def stop_at(
+        self, row: Rows, trees: Trees, held: Mapping[int, FloatArray], number: int = 0
+    ) -> Stop:
+        """Return the stop at an initial configuration; the live scene stays as it is.
+
+        Args:
+            row: The configuration, with the numbers of a state and a torso level that are lowered.
+            trees: Memory of the planner, with its random state.
+            held: Postures at which scoring reaches goals there [rad], shape (7,), by goal.
+            number: Its flat index in `configurations`.
+        """
+        paths, straight = self.scenes_at(int(row.torso[0]))
         motion = placed(paths, self.problem, row)
         work = new_motion_workspace(motion)
         lines, line_work = motion, work
         if straight is not paths:
             lines = placed(straight, self.problem, row)
             line_work = new_motion_workspace(lines)
-        return Stop(self, configuration, motion, work, lines, line_work, trees)
+        return Stop(self, number, row, held, motion, work, lines, line_work, trees)
+
+    def scenes_at(self, torso: int) -> tuple[MotionScene, MotionScene]:
+        """Return the scenes of paths and of straight motions at a torso level, to be placed."""
+        if torso not in self.scenes:
+            self.scenes[torso] = self._scenes_at(torso)
+        return self.scenes[torso]
 
     def _scenes_at(self, torso: int) -> tuple[MotionScene, MotionScene]:
-        """Return the scenes of paths and of straight motions at a torso level, to be placed.
-
-        Pairs of the robot's own shapes that never touch are left out.
-        """
+        """Do as `scenes_at`; pairs of the robot's own shapes that never touch are left out."""
         every, robot = torso_scene(self.problem, torso), self.problem.environment.bodies
         other = every.shapes.body[every.pairs.members[:, 1]]
         kept = needed_pairs(every, other >= robot)
@@ -184,6 +212,10 @@ class Stop:
     grid: StopGrid
     number: int
     """Flat index of the configuration in `grid`."""
+    row: Rows
+    """The configuration."""
+    held: Mapping[int, FloatArray]
+    """Postures at which scoring reaches goals [rad], shape (7,), by goal; none if unknown."""
     motion: MotionScene
     """The scene of paths, with the boxes that they keep out of."""
     work: MotionWorkspace
@@ -191,9 +223,6 @@ class Stop:
     """The scene of straight motions to and from goals."""
     line_work: MotionWorkspace
     trees: Trees
-    ignored: frozenset[BodyPair] = frozenset()
-    """Bodies of the robot and of the environment whose contact does not count while the arm rests,
-    as of base and furniture that stands elsewhere than assumed."""
 
     @classmethod
     def of(cls, job: Job, scene: Scene, configuration: int, seed: int) -> Stop:
@@ -283,14 +312,26 @@ class Stop:
     def goal_in_arm_base(self, goal: int) -> tuple[FloatArray, FloatArray]:
         """Return the pose of a goal in the arm base A: orientation (3, 3), position (3,) [m].
 
-        Of a free goal it is the pose at which scoring reaches it.
+        Of a free goal it is the pose at which scoring reaches it, the nominal one if it does not.
         """
-        row = rows_at(self.grid.lowered.grid, [self.number])
-        R_AG, p_AG = goal_from_arm_base(self.problem, row, goal)
-        if self.grid.poses is None:
-            return R_AG, p_AG
-        R_GT, p_GT = self.grid.poses.at(self.number)[goal]
-        return R_AG @ R_GT, p_AG + R_AG @ p_GT
+        if self.job.task.goals[goal].region and goal in self.held:
+            R_AT, p_AT = np.empty((1, 3, 3)), np.empty((1, 3))
+            chain = self.problem.chain
+            tool_poses(chain.R, chain.p, self.held[goal][None], R_AT, p_AT)
+            return R_AT[0], p_AT[0]
+        return goal_from_arm_base(self.problem, self.row, goal)
+
+    def region_in_arm_base(self, goal: int) -> list[tuple[FloatArray, FloatArray]]:
+        """Return other poses of a goal's region in the arm base, as `goal_in_arm_base` does."""
+        region = self.grid.regions[goal]
+        if region is None:
+            return []
+        R_WA, p_WA = arm_base(self.problem, self.row)
+        goals, state = self.problem.goals, self.row.state[0]
+        R_WG, p_WG = goals.R[state, region.pose], goals.p[state, region.pose]
+        R_AT = np.ascontiguousarray(R_WA.T @ R_WG @ region.R)
+        p_AT = (p_WG + np.einsum("uij,uj->ui", R_WG, region.p) - p_WA) @ R_WA
+        return list(zip(R_AT, p_AT, strict=True))
 
     def place(self, values: dict[str, float]) -> None:
         """Set the live scene to this stop, the arm to its rest posture.
@@ -347,5 +388,5 @@ class Stop:
         return found[0] if found else self.contact_at(self.rest)
 
     def resting_contacts(self) -> list[BodyPair]:
-        """Return the bodies that Drake finds in contact, without those that are ignored."""
-        return [pair[:2] for pair in self.scene.violations() if pair[:2] not in self.ignored]
+        """Return the bodies that Drake finds in contact in the live scene."""
+        return [pair[:2] for pair in self.scene.violations()]

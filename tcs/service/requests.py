@@ -203,7 +203,7 @@ class EvaluateRequest(Observed):
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
     select: Text | Annotated[list[int], Field(max_length=3)] = "best"
     members: Annotated[int, Field(strict=True, ge=1, le=2)] = 2
-    body_collisions: Text = "paper"
+    body_collisions: Text | None = None
 
 
 class PlanRequest(Observed, State):
@@ -240,7 +240,7 @@ class RefineRequest(Observed):
     rounds: Annotated[int, Field(strict=True, ge=1, le=1000)] = 40
     samples: Annotated[int, Field(strict=True, ge=1, le=10_000)] | None = None
     keep_success: Annotated[bool, Field(strict=True)] = True
-    body_collisions: Text = "paper"
+    body_collisions: Text | None = None
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
 
 

@@ -139,7 +139,7 @@ class SceneWork:
         Raises:
             TcsError: As `tcs.evaluate`.
         """
-        from tcs.placement.robustness import evaluate
+        from tcs.motion import evaluate
 
         file = self._files.for_scene(request.file)
         found = evaluate(

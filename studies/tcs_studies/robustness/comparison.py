@@ -109,7 +109,7 @@ def compare_methods(
     if isinstance(file, Trials):
         trials = file
     else:
-        trials = Trials.of(file, errors=errors, on_compile=on_compile)
+        trials = Trials.of(file, errors=errors, body_collisions="paper", on_compile=on_compile)
     sets = trials.scored.sets
     has_two = len(sets.best) > 1 and sets.kept_pairs > 0
     compared = [method for method in METHODS if method[0] == 1 or has_two]

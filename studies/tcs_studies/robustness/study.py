@@ -123,7 +123,7 @@ def study_row(path: Path, plan: StudyPlan, jobs: int = 1) -> RowStudy:
     """
     begun, cpu = time.perf_counter(), time.process_time()
     file = load_scores(path)
-    trials = Trials.of(file)
+    trials = Trials.of(file, body_collisions="paper")
     task, spec = trials.job.task, trials.job.spec
     sampling: dict[str, Any] = {"samples": plan.samples, "seed": plan.seed, "jobs": jobs}
     methods = None
@@ -181,7 +181,7 @@ def study_rows(
         TcsError: As `study_row`.
     """
     # Compile once, not in every process.
-    Trials.of(load_scores(paths[0]), on_compile=on_compile).start.ensure()
+    Trials.of(load_scores(paths[0]), body_collisions="paper", on_compile=on_compile).start.ensure()
     done = []
     # Processes, because much of the work holds the global interpreter lock.
     work = Parallel(n_jobs=min(jobs, len(paths)), return_as="generator")

@@ -7,6 +7,8 @@ the region, which are scored as goals of a single pose.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from tcs.kernel.approach import sweep
@@ -119,27 +121,49 @@ def _try_other_poses(
         pairs.dexterity[to], pairs.joints[to] = found.dexterity[leads], found.joints[leads]
 
 
+class RegionPoses(NamedTuple):
+    """Some poses of the region of a goal, the nominal ones first."""
+
+    pose: IntArray
+    """Number of the goal's pose in whose frame each is given, shape (n,)."""
+    R: FloatArray
+    """Orientations of the tool there, shape (n, 3, 3)."""
+    p: FloatArray
+    """Positions there [m], shape (n, 3)."""
+    nominal: int
+    """Number of nominal ones."""
+
+
+def region_poses(problem: Problem, goal: int) -> RegionPoses:
+    """Return the nominal poses of a goal, and at most MOST_POSES others of its region."""
+    goals = problem.goals
+    nominal = np.array(list(goals.poses_of(goal)), dtype=np.int64)
+    pose, R, p = (
+        [nominal],
+        [np.tile(np.eye(3), (len(nominal), 1, 1))],
+        [np.zeros((len(nominal), 3))],
+    )
+    for number in nominal.tolist() if goals.freedom.first.size else ():
+        form, u = goals.freedom.form[number], goals.freedom.samples(number)
+        pose.append(np.full(len(u), number))
+        R.append(orientations(form, u).as_matrix())
+        p.append(u[:, 3:6])
+    of, every_R, every_p = np.concatenate(pose), np.concatenate(R), np.concatenate(p)
+    count = len(nominal)
+    others = np.linspace(count, len(of), MOST_POSES, endpoint=False).astype(np.int64)
+    some = np.unique(np.concatenate([np.arange(count), others[others < len(of)]]))
+    return RegionPoses(of[some], every_R[some], every_p[some], count)
+
+
 def _sampled(problem: Problem, goal: int) -> tuple[Problem, IntArray]:
     """Return a problem whose goals are single poses of the region of one goal.
 
     Also the numbers of those that are nominal ones.
     """
-    goals, R, p = problem.goals, [], []
-    for pose in goals.poses_of(goal):
-        R_WG, p_WG = goals.R[:, pose], goals.p[:, pose]
-        R.append(R_WG[:, None])
-        p.append(p_WG[:, None])
-    count = len(R)
-    for pose in goals.poses_of(goal) if goals.freedom.first.size else ():
-        R_WG, p_WG = goals.R[:, pose], goals.p[:, pose]
-        form, u = goals.freedom.form[pose], goals.freedom.samples(pose)
-        R.append(R_WG[:, None] @ orientations(form, u).as_matrix())
-        p.append(p_WG[:, None] + np.einsum("sij,uj->sui", R_WG, u[:, 3:6]))
-    every_R, every_p = np.concatenate(R, axis=1), np.concatenate(p, axis=1)
-    others = np.linspace(count, every_p.shape[1], MOST_POSES, endpoint=False).astype(np.int64)
-    nominal = np.arange(count)
-    some = np.unique(np.concatenate([nominal, others[others < every_p.shape[1]]]))
-    return problem.at_single_poses(every_R[:, some], every_p[:, some]), nominal
+    some = region_poses(problem, goal)
+    R_WG, p_WG = problem.goals.R[:, some.pose], problem.goals.p[:, some.pose]
+    exact = problem.at_single_poses(R_WG @ some.R, p_WG + np.einsum("suij,uj->sui", R_WG, some.p))
+    return exact, np.arange(some.nominal)
 
 
 def _at_postures(problem: Problem, rows: Rows, q: FloatArray) -> Problem:

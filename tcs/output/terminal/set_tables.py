@@ -20,6 +20,7 @@ from tcs.output.words import (
 )
 from tcs.output.words.success import (
     BODY_COLLISIONS,
+    DONE_BY,
     NOT_DONE_TEXTS,
     error_width,
     measure_name,
@@ -46,16 +47,19 @@ def report_evaluation(result: Mapping[str, Any]) -> None:
     )
     out.print(
         f"under error {result['mean']:.1%} of the goals{interval}, "
-        f"standard deviation {result['std']:.1%}; all goals in {result['complete']:.1%} of "
-        f"{result['samples']:,} samples"
+        f"standard deviation {result['std']:.1%}"
     )
+    low, high = result["rooms_done_ci95"]
+    out.print(
+        f"all goals done in {result['rooms_done']:.1%} of {result['samples']:,} samples "
+        f"(95 % interval {low:.1%} to {high:.1%}), reached in {result['complete']:.1%}"
+    )
+    out.print(DONE_BY[result["done_by"]])
     goals = ", ".join(f"{i}: {part:.1%}" for i, part in enumerate(result["per_goal"], start=1))
     out.print(f"by goal  {goals}")
     widths = ", ".join(f"{joint} {error_width(error)}" for joint, error in result["errors"].items())
     out.print(f"errors  {widths}")
     out.print(f"collisions  {BODY_COLLISIONS[result['body_collisions']]}")
-    if result["approach"]:
-        out.print("a goal counts only if a posture there can be approached, as in the file")
     if result["clipped"]:
         out.print(f"in {result['clipped']:,} samples an error was limited by a joint limit")
     out.print(f"seed {result['seed']}, {result['seconds']:.1f} s")
@@ -70,6 +74,12 @@ def report_plan_success(result: Mapping[str, Any]) -> None:
     if result["replanned"] is not None:
         again = _with_interval(result["replanned"])
         out.print(f"planned anew, all goals of the plan can be done in {again}")
+        low, high = result["rooms_done_ci95"]
+        out.print(
+            f"all goals of the task can be done in {result['rooms_done']:.1%} "
+            f"(95 % interval {low:.1%} to {high:.1%})"
+        )
+    out.print(f"collisions  {BODY_COLLISIONS[result['body_collisions']]}")
     widths = ", ".join(f"{joint} {error_width(error)}" for joint, error in result["errors"].items())
     out.print(f"errors  {widths}")
     if result["clipped"]:
@@ -264,7 +274,7 @@ def report_refined(result: Mapping[str, Any]) -> None:
             f"success {cause} from {success['before']:.1%} to {success['after']:.1%}, in "
             f"{success['samples']:,} other samples than those that chose the set"
         )
-        if not result["displaced"] and result["body_collisions"] != "paper":
+        if not result["displaced"]:
             out.print(f"under error, collisions {BODY_COLLISIONS[result['body_collisions']]}")
     out.print(
         f"{result['sets']} sets refined, {result['scored']:,} configurations scored in "

@@ -8,11 +8,19 @@ from typing import Any
 from tcs.output.words.reasons import pair_text
 
 BODY_COLLISIONS = {
+    "all": "of the robot's body count, those of the base with the furniture too",
     "paper": "of the robot's body count, except those of the base with the furniture",
-    "all": "of the robot's body count",
     "none": "of the robot's body are ignored",
 }
 """What the collisions of base, torso, head and other arm mean for a sample."""
+
+
+DONE_BY = {
+    "motion": "a goal is done if a posture there is approached by a motion from rest, and back",
+    "approach": "a goal is done if a posture there can be approached",
+    "posture": "a goal is done if a posture reaches it",
+}
+"""By what a goal is done in a sample."""
 
 
 def error_width(error: Mapping[str, Any]) -> str:

@@ -264,7 +264,7 @@ def population(
         file,
         errors=None if isinstance(errors, bool) else errors,
         table=table,
-        body_collisions="paper" if is_perturbed else "all",
+        body_collisions=None if is_perturbed else "all",
         on_compile=on_compile,
     )
     trials = for_papers_man(trials)

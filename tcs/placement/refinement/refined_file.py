@@ -39,7 +39,7 @@ from tcs.placement.refinement.surest import (
     surest_triples,
 )
 from tcs.placement.robustness import PerturbedPoints, Trials, with_success
-from tcs.placement.robustness.body_collisions import check_body_collisions
+from tcs.placement.robustness.body_collisions import check_body_collisions, default_collisions
 from tcs.placement.selection import Top, UtilityWeights, select
 from tcs.placement.selection.choice import SelectionTables
 from tcs.placement.store import ScoreFile
@@ -81,7 +81,7 @@ def refine(
     rounds: int = 40,
     samples: int | None = None,
     keep_success: bool = True,
-    body_collisions: str = "paper",
+    body_collisions: str | None = None,
     seed: int = 0,
     table: int | None = None,
     jobs: int = 2,
@@ -108,7 +108,8 @@ def refine(
             the errors of the environment (of the base, if it has none) as the best set of the
             grid, in the hardest of the samples and in others that judge the result.
         body_collisions: Collisions of the robot's body that count under the errors of the
-            environment, one of `BODY_COLLISIONS`. Without errors all count, as when scoring.
+            environment, one of `BODY_COLLISIONS`; by default all, in a file scored as the paper
+            does `paper`. Without errors all count, as when scoring.
         seed: Seed of the search and of the samples; the result is the same for any number of
             jobs.
         table: Number of the table; by default the nominal one. The others keep what they have.
@@ -131,6 +132,8 @@ def refine(
     check_draws(samples, seed)
     if objective not in OBJECTIVES:
         raise UnknownNameError("objective", objective, OBJECTIVES, where="refine")
+    if body_collisions is None:
+        body_collisions = default_collisions(file.metadata)
     check_body_collisions(body_collisions)
     if not 1 <= starts <= MOST_STARTS:
         raise TcsError(f"starts is {starts}; must be 1 to {MOST_STARTS}.")

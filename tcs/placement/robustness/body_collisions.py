@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from pydrake.multibody.tree import RevoluteJoint, WeldJoint
@@ -10,15 +12,25 @@ from pydrake.multibody.tree import RevoluteJoint, WeldJoint
 from tcs.errors import UnknownNameError
 from tcs.kernel.arrays import BoolArray
 from tcs.model.scene import LoweredScene, Scene
+from tcs.placement.store import PAPER
 
-BODY_COLLISIONS = ("paper", "all", "none")
+BODY_COLLISIONS = ("all", "paper", "none")
 """Collisions of the robot at rest, its body and the scored arm, with the environment:
 
+- `all`: all of them, with the distances that the robot keeps.
 - `paper`: all but those of the base with the furniture, which the evaluation of the TCS paper
   ignores: the base may touch a wheelchair that stands elsewhere than assumed.
-- `all`: all of them.
 - `none`: none of them, as in hrl_base_selection in gt-ros-pkg/hrl-assistive (BSD), 30 April 2015.
 """
+
+
+def default_collisions(metadata: Mapping[str, Any]) -> str:
+    """Return the collisions that count unless others are requested, one of `BODY_COLLISIONS`.
+
+    Args:
+        metadata: The metadata of a score file, or the record of what a plan was made from.
+    """
+    return "paper" if metadata.get(PAPER) is True else "all"
 
 
 def check_body_collisions(name: str) -> None:

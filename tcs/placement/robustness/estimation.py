@@ -52,7 +52,7 @@ def robustify(
     samples: int = 1024,
     seed: int = 0,
     errors: Errors = None,
-    body_collisions: str = "paper",
+    body_collisions: str | None = None,
     tables: Sequence[int] | None = None,
     jobs: int = 2,
     blocks: BlockFolder | None = None,
@@ -118,7 +118,7 @@ def robustify(
         "sets": sets,
         "errors": trials.errors.to_json(),
         "environment_errors": errors is None,
-        "body_collisions": body_collisions,
+        "body_collisions": trials.body_collisions,
     }
     # One record for each table, because tables may be estimated at different times.
     records = list(file.metadata.get("robustness", [None] * len(scored)))

@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 
 from tcs.errors import SelectionError, TcsError, UnknownNameError
 from tcs.files.blocks import BlockFolder
+from tcs.kernel.arrays import FloatArray
 from tcs.model.random_streams import check_draws
 from tcs.placement.robustness.error_model import ErrorModel, Offsets
 from tcs.placement.robustness.kept_pairs import EQUAL_REACHABILITY, uniform_sets
 from tcs.placement.robustness.perturbed_points import PerturbedPoints
-from tcs.placement.robustness.statistics import Mean, mean_of
+from tcs.placement.robustness.statistics import Mean, binomial_interval, mean_of
 from tcs.placement.robustness.trials import Errors, Progress, Trials
-from tcs.placement.store import ScoreFile, StateTables, state_to_json
+from tcs.placement.store import PAPER, ScoreFile, StateTables, state_to_json
 from tcs.placement.tables import tc_reachability
 
 SELECTIONS = ("best", "single", "robust", "refined", "uniform", "equal")
@@ -28,6 +29,28 @@ robust set (greatest lower confidence bound on success, estimated by `robustify`
 the best one unless its number is given; or, as the
 paper's "without TC-manipulability", another set in every sample, drawn uniformly from those whose
 P_R is at least 0.98 of the greatest, as in hrl_base_selection, or equal to it, as printed."""
+
+DONE_BY = ("motion", "approach", "posture")
+"""By what a goal is done in a sample, each including those behind it: a motion from rest to its
+approach and back, an approach to a posture, a posture without contact."""
+
+Judge = Callable[..., NDArray[np.bool_]]
+"""Function that returns which goals are done by motions: `tcs.motion.rooms.done_in_rooms`."""
+
+
+def done_by(trials: Trials, judge: Judge | None) -> str:
+    """Return by what a goal is done, one of `DONE_BY`.
+
+    Args:
+        trials: Trials of a score file. Without approach, nothing is said about motions; the paper
+            has none.
+        judge: Who judges motions; None if nobody does.
+    """
+    if not trials.with_approach:
+        return "posture"
+    is_paper = trials.file.metadata.get(PAPER) is True
+    return "approach" if judge is None or is_paper else "motion"
+
 
 _DRAWN = {"uniform": EQUAL_REACHABILITY, "equal": 1.0}
 """Selections that draw sets: the fraction of the greatest P_R that these have at least."""
@@ -44,7 +67,11 @@ class Evaluation:
     offsets: Offsets
     """Error of each joint in each sample [m or rad], shapes (samples,)."""
     reached: NDArray[np.bool_]
-    """Whether any member reaches a goal, shape (samples, goals)."""
+    """Whether any member reaches a goal, approachably if `approach`, shape (samples, goals)."""
+    done: NDArray[np.bool_]
+    """Whether a goal is done from any member, shape (samples, goals)."""
+    done_by: str
+    """By what a goal is done, one of `DONE_BY`."""
     weights: NDArray[np.float64]
     """Weights of the goals, sum 1, shape (goals,)."""
     reachability: float
@@ -74,8 +101,8 @@ class Evaluation:
 
     @cached_property
     def fractions(self) -> NDArray[np.float64]:
-        """Weighted fraction of the goals reached in each sample, shape (samples,)."""
-        return tc_reachability(self.reached, self.weights)
+        """Weighted fraction of the goals done in each sample, shape (samples,)."""
+        return tc_reachability(self.done, self.weights)
 
     @cached_property
     def summary(self) -> Mean:
@@ -89,13 +116,23 @@ class Evaluation:
 
     @property
     def per_goal(self) -> NDArray[np.float64]:
-        """Fraction of the samples in which each goal is reached, shape (goals,)."""
-        return np.asarray(self.reached.mean(axis=0))
+        """Fraction of the samples in which each goal is done, shape (goals,)."""
+        return np.asarray(self.done.mean(axis=0))
 
     @property
     def complete(self) -> float:
         """Fraction of the samples in which all goals are reached."""
         return float(self.reached.all(axis=1).mean())
+
+    @property
+    def rooms_done(self) -> float:
+        """Fraction of the samples in which all goals are done."""
+        return float(self.done.all(axis=1).mean())
+
+    @property
+    def rooms_done_ci95(self) -> tuple[float, float]:
+        """Exact 95 % interval of `rooms_done`, by Clopper and Pearson."""
+        return binomial_interval(int(np.count_nonzero(self.done.all(axis=1))), self.samples)
 
     def to_json(self) -> dict[str, Any]:
         """Return the figures as plain containers, as printed by `tcs evaluate --json`."""
@@ -113,6 +150,9 @@ class Evaluation:
             "ci95": None if interval is None else list(interval),
             "per_goal": self.per_goal.tolist(),
             "complete": self.complete,
+            "rooms_done": self.rooms_done,
+            "rooms_done_ci95": list(self.rooms_done_ci95),
+            "done_by": self.done_by,
             "samples": self.samples,
             "seed": self.seed,
             "errors": self.errors.to_json(),
@@ -135,17 +175,20 @@ def evaluate(
     table: int | None = None,
     body_collisions: str | None = None,
     stream: str = "",
+    judge: Judge | None = None,
     jobs: int = 2,
     blocks: BlockFolder | None = None,
     on_progress: Progress = None,
     on_compile: Callable[[], None] | None = None,
 ) -> Evaluation:
-    """Return which goals a set of configurations reaches in perturbed environments.
+    """Return which goals are done from a set of configurations in perturbed environments.
 
     In each sample the joints of the error model are displaced by random errors. A goal is reached
     if any member of the set has a collision-free solution for it, that can be approached if the
-    file was scored with approach. The initial configurations are unchanged; arm postures are
-    computed again. The same seed gives the same samples for every set.
+    file was scored with approach. It is done if a motion leads there from rest and back as well,
+    in a file with approach that was not scored as the paper does; in others, if it is reached. The
+    initial configurations are unchanged; arm postures and motions are computed again. The same
+    seed gives the same samples for every set.
 
     Args:
         file: A score file; or its trials, which is faster for repeated evaluation.
@@ -158,8 +201,11 @@ def evaluate(
         row: Number of the set of "refined", the best first.
         table: Number of the file's table; by default the nominal one. Not for trials.
         body_collisions: Collisions of the robot's body that count, one of `BODY_COLLISIONS`; by
-            default `paper`. Not for trials.
+            default all, in a file scored as the paper does `paper`. Not for trials.
         stream: Name of the draw; another name gives independent samples.
+        judge: Judges motions; `tcs.evaluate` passes `tcs.motion.rooms.done_in_rooms`. None, and for
+            sets that are drawn, to count goals by their approaches. The reached goals are then not
+            taken from blocks.
         jobs: Number of threads.
         blocks: Folder in which finished blocks are kept, so that the same call continues after an
             interrupt; None to keep none. Those of "refined" are not kept.
@@ -168,7 +214,7 @@ def evaluate(
         on_compile: Called first if the kernel has to be compiled.
 
     Returns:
-        Goals reached in each sample, with mean, standard deviation and interval.
+        Goals reached and done in each sample, with mean, standard deviation and interval.
 
     Raises:
         StoreMismatchError: If the file was made from other models.
@@ -196,7 +242,7 @@ def evaluate(
             file,
             errors=errors,
             table=table,
-            body_collisions="paper" if body_collisions is None else body_collisions,
+            body_collisions=body_collisions,
             on_compile=on_compile,
         )
     offsets = trials.errors.draw(samples, seed, stream=stream)
@@ -206,14 +252,19 @@ def evaluate(
         sets, choices = refined.origin.astype(np.int64), 1
     else:
         sets, choices = _chosen(trials.scored, select, members, samples, seed)
+    means = done_by(trials, None if is_drawn else judge)
+    points = trials.points(sets[0]) if refined is None else refined.values[0]
+    done = None
     with trials.kept_in(blocks) as kept:
         if is_drawn:
             # Set i is evaluated on sample i only, with all of its members.
             tiled = {name: np.tile(values, sets.shape[1]) for name, values in offsets.items()}
             found = kept.reached_each(sets.T.ravel(), tiled, jobs=jobs, on_progress=on_progress)
             found = found.reshape(sets.shape[1], samples, -1)
+        elif judge is not None and means == "motion":
+            found, done = _judged(trials, offsets, points, judge, seed, jobs, on_progress)
         elif refined is not None:
-            found = PerturbedPoints(trials, offsets, jobs).reached(refined.values[0])
+            found = PerturbedPoints(trials, offsets, jobs).reached(points)
         else:
             found = kept.reached(sets[0], offsets, jobs=jobs, on_progress=on_progress)
     reached: NDArray[np.bool_] = np.logical_or.reduce(found, axis=0)
@@ -223,13 +274,17 @@ def evaluate(
     else:
         scores = np.array([trials.scored.sets.scores_of(tuple(map(int, one))) for one in sets])
         of_set = () if is_drawn else tuple(map(trials.grid.configuration, sets[0].tolist()))
-    for array in (sets, reached, *offsets.values()):
+    if done is None:
+        done = reached
+    for array in (sets, reached, done, *offsets.values()):
         array.flags.writeable = False
     return Evaluation(
         select=select if isinstance(select, str) else "given",
         sets=sets,
         offsets=offsets,
         reached=reached,
+        done=done,
+        done_by=means,
         weights=trials.weights,
         reachability=float(scores[:, 0].mean()),
         manipulability=float(scores[:, 1].mean()),
@@ -250,6 +305,31 @@ def evaluate(
         },
         members=tuple(member.to_json() for member in of_set),
     )
+
+
+def _judged(
+    trials: Trials,
+    offsets: Offsets,
+    points: FloatArray,
+    judge: Judge,
+    seed: int,
+    jobs: int,
+    on_progress: Progress,
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return which goals points reach, shape (m, samples, goals), and which are done from any."""
+    samples = PerturbedPoints(trials, offsets, jobs)
+    rooms, tried = samples.samples, len(points) * samples.samples
+
+    def report(done: int) -> None:
+        if on_progress is not None:
+            on_progress(done, tried + rooms)
+
+    found = samples.scores(points, lambda done, _: report(done))
+    every = np.arange(rooms)
+    done = judge(
+        samples, points, found, every, seed=seed, on_progress=lambda done, _: report(tried + done)
+    )
+    return found.reached, done
 
 
 def _chosen(

@@ -25,6 +25,7 @@ from tcs.placement.robustness.body_collisions import (
     check_body_collisions,
     counted_pairs,
     counted_rests,
+    default_collisions,
 )
 from tcs.placement.robustness.error_model import ErrorModel, Offsets, displaced, samples_of
 from tcs.placement.robustness.kept_runs import kept_runs, states_digest, trials_key
@@ -128,7 +129,7 @@ class Trials:
         *,
         errors: Errors = None,
         table: int | None = None,
-        body_collisions: str = "paper",
+        body_collisions: str | None = None,
         on_compile: Callable[[], None] | None = None,
     ) -> Trials:
         """Return the trials of a score file.
@@ -137,7 +138,8 @@ class Trials:
             file: A score file.
             errors: Path of an error file, or errors by joint, in place of those of the environment.
             table: Number of one of its tables; by default the nominal one.
-            body_collisions: Collisions of the robot's body that count, one of `BODY_COLLISIONS`.
+            body_collisions: Collisions of the robot's body that count, one of `BODY_COLLISIONS`;
+                None for those of `default_collisions`.
             on_compile: Called first if the kernel has to be compiled.
 
         Raises:
@@ -146,7 +148,8 @@ class Trials:
             UnknownNameError: If a named model, joint or choice of collisions does not exist.
             SelectionError: If there is no such table.
         """
-        check_body_collisions(body_collisions)
+        if body_collisions is not None:
+            check_body_collisions(body_collisions)
         built = rebuild_scenes(file)
         chosen = file.nominal_index if table is None else table
         if not 0 <= chosen < len(file.tables):
@@ -169,7 +172,7 @@ class Trials:
         table: int,
         built: Sequence[tuple[Job, Scene, LoweredScene]],
         errors: Errors = None,
-        body_collisions: str = "paper",
+        body_collisions: str | None = None,
     ) -> Trials:
         """Return the trials of a table whose scene is built, once for each hand, kernel started.
 
@@ -180,6 +183,8 @@ class Trials:
             errors: As for `of`.
             body_collisions: As for `of`.
         """
+        if body_collisions is None:
+            body_collisions = default_collisions(file.metadata)
         hands = tuple(
             HandTrials(
                 job,
@@ -217,7 +222,7 @@ class Trials:
     def key(self) -> str:
         """Hash of what the trials of all tables follow from, but for the errors."""
         hands = ((hand.lowered, hand.body_pairs, hand.lines) for hand in self.hands)
-        return trials_key(hands, self._measure)
+        return trials_key(hands, self.measure)
 
     @property
     def with_approach(self) -> bool:
@@ -232,7 +237,7 @@ class Trials:
     @cached_property
     def together(self) -> Hands:
         """The hands, to check arms that work at the same time against each other."""
-        return Hands.of([(hand.job, hand.lowered) for hand in self.hands], self._measure)
+        return Hands.of([(hand.job, hand.lowered) for hand in self.hands], self.measure)
 
     @cached_property
     def task(self) -> Task:
@@ -258,6 +263,33 @@ class Trials:
     def observed(self) -> Mapping[str, float]:
         """Observed state that the table was scored for, by joint [m or rad]."""
         return self.file.observed_states[self.table]
+
+    @property
+    def measure(self) -> str:
+        """Name of the dexterity measure."""
+        return str(self.file.metadata["measure"])
+
+    @property
+    def goals(self) -> int:
+        """Number of goals of the task."""
+        return int(self.weights.size)
+
+    @property
+    def environment_axes(self) -> tuple[str, ...]:
+        """Names of the grid's axes that are the environment's."""
+        return tuple(axis.name for axis in self.grid.environment_axes)
+
+    def points(self, members: ArrayLike) -> FloatArray:
+        """Return the values of the grid's axes of configurations [m or rad], shape (n, axes).
+
+        Args:
+            members: Flat configuration indices, shape (n,).
+
+        Raises:
+            GridError: If there is no such configuration.
+        """
+        at = self.grid.values(np.asarray(members, dtype=np.int64))
+        return np.stack([at[axis.name] for axis in self.grid.axes], axis=-1)
 
     @property
     def weights(self) -> FloatArray:
@@ -294,7 +326,7 @@ class Trials:
         poses = self.poses(members)
         samples = samples_of(offsets)
         out = np.zeros((poses.state.size, samples, self.weights.size), dtype=np.bool_)
-        step = _counter(poses.state.size * samples, on_progress)
+        step = counter(poses.state.size * samples, on_progress)
         for state in np.unique(poses.state):
             rows = np.flatnonzero(poses.state == state)
             for first in range(0, samples, CHUNK):
@@ -341,7 +373,7 @@ class Trials:
                 "one for each."
             )
         out = np.zeros((poses.state.size, self.weights.size), dtype=np.bool_)
-        step = _counter(len(out), on_progress)
+        step = counter(len(out), on_progress)
         for state in np.unique(poses.state):
             rows = np.flatnonzero(poses.state == state)
             for first in range(0, rows.size, CHUNK):
@@ -437,15 +469,11 @@ class Trials:
         """
         return displaced(self.job, self.scene, self.nominal(state), offsets)
 
-    @property
-    def _measure(self) -> str:
-        return str(self.file.metadata["measure"])
-
     def _scenes(self, state: int, offsets: Offsets) -> PerturbedScenes:
         """Return one state of the environment in each sample, as arrays."""
         self.start.ensure()
         positions, _ = self.positions(state, offsets)
-        scenes = tuple(hand.scenes(positions, self._measure) for hand in self.hands)
+        scenes = tuple(hand.scenes(positions, self.measure) for hand in self.hands)
         return PerturbedScenes(scenes, self.together)
 
     def _found(
@@ -475,7 +503,7 @@ def _states(positions: Mapping[str, FloatArray]) -> Iterator[dict[str, float]]:
         yield {name: float(values[i]) for name, values in positions.items()}
 
 
-def _counter(total: int, on_progress: Progress) -> Callable[[int], None]:
+def counter(total: int, on_progress: Progress) -> Callable[[int], None]:
     """Return a function that adds up work done and reports the sum."""
     count = 0
 

@@ -150,7 +150,7 @@ def test_more_samples_need_only_the_further_ones(run, bed_trials, monkeypatch, e
     "options",
     [
         {"seed": 1},
-        {"body_collisions": "all"},
+        {"body_collisions": "paper"},
         {"table": 1},
         {"errors": {"person_x": ErrorDistribution(distribution="normal", std=0.01)}},
     ],

@@ -46,8 +46,7 @@ def refine_command(report: ScoreReport) -> str:
         words += ["--samples", str(found["samples"])]
     if found["objective"] == "score" and not found["keep_success"]:
         words.append("--no-keep-success")
-    if found.get("body_collisions", "paper") != "paper":
-        words += ["--body-collisions", found["body_collisions"]]
+    words += ["--body-collisions", found.get("body_collisions", "paper")]
     words += ["--seed", str(found["seed"])]
     if report.shown.table != report.file.nominal_index:
         words += _observed(report)
@@ -104,8 +103,7 @@ def robustify_command(report: ScoreReport) -> str:
     words = ["tcs", "robustify", str(report.path)]
     words += ["--sets", str(record["sets"]), "--samples", str(record["samples"])]
     words += ["--seed", str(record["seed"])]
-    if record["body_collisions"] != "paper":
-        words += ["--body-collisions", record["body_collisions"]]
+    words += ["--body-collisions", record["body_collisions"]]
     if not record["environment_errors"]:
         words += ["--errors", "ERRORS.yaml"]
     records = report.file.metadata["robustness"]
