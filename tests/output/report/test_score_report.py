@@ -171,10 +171,7 @@ def test_the_set_is_the_one_selected_from_here(score_path):
     here = InitialConfiguration(base_x=0.6, base_y=0.7, base_yaw=0.0, torso=0.0)
     found = make_score_report(score_path, here=here, sizes=CheckSizes(pairs=0, dense=0))
     wording = as_markdown(make_score_page(found, command="c"))
-    assert (
-        "selected with the default weights for a robot at x 0.60 m, y 0.70 m, heading 0 deg"
-        in wording
-    )
+    assert "Recommended for a robot at x 0.60 m, y 0.70 m, heading 0 deg" in wording
 
 
 @pytest.fixture(scope="module")

@@ -46,7 +46,7 @@ def refine_command(report: ScoreReport) -> str:
         words += ["--samples", str(found["samples"])]
     if found["objective"] == "score" and not found["keep_success"]:
         words.append("--no-keep-success")
-    words += ["--body-collisions", found.get("body_collisions", "paper")]
+    words += _collisions(report, found.get("body_collisions", "paper"))
     words += ["--seed", str(found["seed"])]
     if report.shown.table != report.file.nominal_index:
         words += _observed(report)
@@ -103,13 +103,19 @@ def robustify_command(report: ScoreReport) -> str:
     words = ["tcs", "robustify", str(report.path)]
     words += ["--sets", str(record["sets"]), "--samples", str(record["samples"])]
     words += ["--seed", str(record["seed"])]
-    words += ["--body-collisions", record["body_collisions"]]
+    words += _collisions(report, record["body_collisions"])
     if not record["environment_errors"]:
         words += ["--errors", "ERRORS.yaml"]
     records = report.file.metadata["robustness"]
     if any(other != record for other in records):
         words += _observed(report)
     return shlex.join(words)
+
+
+def _collisions(report: ScoreReport, counted: str) -> list[str]:
+    """Return the option that names the counted collisions, [] if they are those by default."""
+    default = "paper" if PAPER in report.file.metadata else "all"
+    return [] if counted == default else ["--body-collisions", counted]
 
 
 def success_record(report: ScoreReport) -> dict[str, Any] | None:
