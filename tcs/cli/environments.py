@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -26,10 +26,16 @@ def check(
     as_json: options.Json = False,
 ) -> None:
     """Check an environment without a robot: what touches what, what is outside the grid."""
+    is_sound, found = checked(environment)
+    terminal.print_result(found, environment_tables.report_check, as_json=as_json)
+    if not is_sound:
+        raise typer.Exit(1)
+
+
+def checked(environment: str) -> tuple[bool, dict[str, Any]]:
+    """Return whether an environment can be used, and what was found."""
     from tcs.model.scene import load_environment
     from tcs.model.scene.environment.check import check_environment
 
     found = check_environment(load_environment(environment))
-    terminal.print_result(found.to_json(), environment_tables.report_check, as_json=as_json)
-    if not found.is_sound:
-        raise typer.Exit(1)
+    return found.is_sound, found.to_json()

@@ -214,17 +214,3 @@ def motions(
     save_motions(path, found)
     result = {"file": str(path), **examination(loaded, found, table)}
     terminal.print_result(result, report_motions, as_json=as_json)
-
-
-def verify_plan(path: Path, *, as_json: bool) -> None:
-    """Re-check a plan with Drake; exit with 1 if it does not hold."""
-    from tcs.motion import check_plan, load_plan
-    from tcs.output.terminal.set_tables import report_plan_check
-
-    plan = load_plan(path)
-    with terminal.progress_bar("segments") as on_progress:
-        found = check_plan(plan, on_progress=on_progress)
-    terminal.print_result(found.to_json(), report_plan_check, as_json=as_json)
-    if not found.is_sound:
-        terminal.note(f"the plan '{path}' is false; do not use it.")
-        raise typer.Exit(1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -57,19 +57,16 @@ def draw_map(
     if score not in (None, *SCORES):
         raise typer.BadParameter(f"must be one of {', '.join(SCORES)}.", param_hint="--score")
 
-    def figure(loaded: ScoreFile, shown: ShownSet) -> Figure:
-        if states:
-            from tcs.output.report.score.states import states_figure
+    def of_states(loaded: ScoreFile, shown: ShownSet) -> Figure:
+        from tcs.output.report.score.states import states_figure
 
-            by_manipulability = score == "manipulability"
-            return states_figure(
-                loaded, shown, "manipulability" if by_manipulability else "reachability"
-            )
-        from tcs.output.report.score.pictures import map_figure
+        by_manipulability = score == "manipulability"
+        return states_figure(
+            loaded, shown, "manipulability" if by_manipulability else "reachability"
+        )
 
-        return map_figure(loaded, shown)
-
-    _draw(figure, file, out, chosen, as_json=as_json)
+    drawn = _draw(of_states, file, out, chosen) if states else map_from_above(file, out, chosen)
+    _print(drawn, as_json=as_json)
 
 
 @expand_options
@@ -83,13 +80,29 @@ def draw_picture(
 
     The picture shows the set selected from --here, or the recommended one.
     """
+    _print(picture(file, out, chosen), as_json=as_json)
+
+
+def map_from_above(file: Path, out: Path, chosen: options.ShownOptions) -> dict[str, Any]:
+    """Draw both scores at each base position and the members of a set."""
+
+    def figure(loaded: ScoreFile, shown: ShownSet) -> Figure:
+        from tcs.output.report.score.pictures import map_figure
+
+        return map_figure(loaded, shown)
+
+    return _draw(figure, file, out, chosen)
+
+
+def picture(file: Path, out: Path, chosen: options.ShownOptions) -> dict[str, Any]:
+    """Draw the robot at the base poses of a set."""
 
     def figure(loaded: ScoreFile, shown: ShownSet) -> Figure:
         from tcs.output.report.score.pictures import scene_figure
 
         return scene_figure(loaded, shown)
 
-    _draw(figure, file, out, chosen, as_json=as_json)
+    return _draw(figure, file, out, chosen)
 
 
 def _draw(
@@ -97,10 +110,8 @@ def _draw(
     file: Path,
     out: Path,
     chosen: options.ShownOptions,
-    *,
-    as_json: bool,
-) -> None:
-    """Draw the set selected from the current state, or the best set."""
+) -> dict[str, Any]:
+    """Draw the set selected from the current state, or the best set; return what was written."""
     import tcs
     from tcs.files.writing import check_writable
     from tcs.output.draw import check_format, save_figure
@@ -115,5 +126,10 @@ def _draw(
     observed = chosen.observation(loaded.observed_axes)
     shown = ShownSet.of(loaded, here, chosen.max_members, observed, refined=chosen.refined)
     save_figure(out, figure(loaded, shown))
-    result = {"file": str(out), "members": [member.to_json() for member in shown.members]}
-    terminal.print_result(result, lambda _: typer.echo(f"wrote {out}"), as_json=as_json)
+    return {"file": str(out), "members": [member.to_json() for member in shown.members]}
+
+
+def _print(result: dict[str, Any], *, as_json: bool) -> None:
+    """Print the file that was written."""
+    wrote = f"wrote {result['file']}"
+    terminal.print_result(result, lambda _: typer.echo(wrote), as_json=as_json)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -85,11 +85,17 @@ def check(
     as_json: options.Json = False,
 ) -> None:
     """Check a robot: arm class, limits, primitives, self-collision, IK; exit 1 if one fails."""
+    is_sound, found = checked(robot, samples=samples, seed=seed)
+    terminal.print_result(found, robot_tables.report_check, as_json=as_json)
+    if not is_sound:
+        terminal.note(f"robot '{found['robot']}' is not fit for scoring.")
+        raise typer.Exit(1)
+
+
+def checked(robot: str, *, samples: int = 1000, seed: int = 0) -> tuple[bool, dict[str, Any]]:
+    """Return whether a robot is fit for scoring, and what was found."""
     from tcs.model.robots import load_robot
     from tcs_shapes.checkup import check_up
 
     found = check_up(load_robot(robot), samples=samples, seed=seed)
-    terminal.print_result(found.to_json(), robot_tables.report_check, as_json=as_json)
-    if not found.is_sound:
-        terminal.note(f"robot '{found.robot.name}' is not fit for scoring.")
-        raise typer.Exit(1)
+    return found.is_sound, found.to_json()

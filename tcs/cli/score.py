@@ -10,12 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tcs.cli import options
-from tcs.cli.motion import verify_plan
 from tcs.cli.options import expand_options
 from tcs.cli.refinement import refined_in_place
 from tcs.output import terminal
-from tcs.output.terminal import tables
-from tcs.output.terminal.set_tables import report_refined
+from tcs.output.terminal import set_tables, tables
 
 if TYPE_CHECKING:
     from tcs.motion import ApproachCheck
@@ -260,7 +258,7 @@ def score(
     report = tables.report_observed if observation is not None else tables.report_scores
     terminal.print_result(result, report, as_json=as_json)
     if refine and not as_json:
-        report_refined({**result["refinement"], "file": path})
+        set_tables.report_refined({**result["refinement"], "file": path})
 
 
 def _note_without_approach(results: Sequence[Mapping[str, Any]]) -> None:
@@ -308,9 +306,27 @@ def verify(
     """Re-check answers with Drake and estimate the recall of the search, or re-check a plan."""
     if limit is not None and not strata:
         raise typer.BadParameter("requires --strata.", param_hint="--limit")
+    is_sound, result = answers_checked(file, sizes, strata=strata, limit=limit, jobs=jobs)
+    is_plan = file.suffix == ".json"
+    report = set_tables.report_plan_check if is_plan else tables.report_verification
+    terminal.print_result(result, report, as_json=as_json)
+    if not is_sound:
+        what = f"the plan '{file}' is false" if is_plan else f"some answers in '{file}' are false"
+        terminal.note(f"{what}; do not use {'it' if is_plan else 'them'}.")
+        raise typer.Exit(1)
+
+
+def answers_checked(
+    file: Path,
+    sizes: options.CheckOptions,
+    *,
+    strata: bool = False,
+    limit: int | None = None,
+    jobs: int = 2,
+) -> tuple[bool, dict[str, Any]]:
+    """Return whether Drake finds no false answer in scores or a plan, and what was found."""
     if file.suffix == ".json":
-        verify_plan(file, as_json=as_json)
-        return
+        return _plan_checked(file)
 
     import tcs
     from tcs.placement.scoring.verify import FALSE_VERDICT
@@ -334,10 +350,17 @@ def verify(
         result["approaches"] = approaches.to_json()
         if not approaches.is_sound:
             result["verdict"], is_sound = FALSE_VERDICT, False
-    terminal.print_result(result, tables.report_verification, as_json=as_json)
-    if not is_sound:
-        terminal.note(f"some answers in '{file}' are false; do not use them.")
-        raise typer.Exit(1)
+    return is_sound, result
+
+
+def _plan_checked(path: Path) -> tuple[bool, dict[str, Any]]:
+    """Return whether Drake confirms a plan, and what was found."""
+    from tcs.motion import check_plan, load_plan
+
+    plan = load_plan(path)
+    with terminal.progress_bar("segments") as on_progress:
+        found = check_plan(plan, on_progress=on_progress)
+    return found.is_sound, found.to_json()
 
 
 def _verify_approaches(file: ScoreFile, pairs: int, seed: int) -> ApproachCheck:
@@ -357,6 +380,14 @@ def export(
     as_json: options.Json = False,
 ) -> None:
     """Write scores as a CSV table, one row for each configuration that reaches a goal."""
+    result = exported(file, out, everything=everything)
+    terminal.print_result(
+        result, lambda _: typer.echo(f"wrote {out}: {result['rows']:,} rows"), as_json=as_json
+    )
+
+
+def exported(file: Path, out: Path, *, everything: bool = False) -> dict[str, Any]:
+    """Write scores as a CSV table and return what was written."""
     import tcs
     from tcs.files.writing import check_writable
 
@@ -367,10 +398,7 @@ def export(
 
     frame = score_frame(loaded, everything=everything)
     write_csv(out, frame)
-    result = {"file": str(out), "rows": len(frame), "columns": list(frame.columns)}
-    terminal.print_result(
-        result, lambda _: typer.echo(f"wrote {out}: {len(frame):,} rows"), as_json=as_json
-    )
+    return {"file": str(out), "rows": len(frame), "columns": list(frame.columns)}
 
 
 def _progress(task: str) -> AbstractContextManager[Any]:

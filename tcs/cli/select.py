@@ -185,8 +185,11 @@ def explain(
     file: options.File,
     *,
     goal: Annotated[
-        str, typer.Option(help="Name of the goal, or its number, from 1.", show_default=False)
-    ],
+        str | None,
+        typer.Option(
+            help="Name of the goal, or its number, from 1.", show_default="all goals, a line each"
+        ),
+    ] = None,
     configuration: Annotated[
         int | None,
         typer.Option(
@@ -231,15 +234,15 @@ def explain(
     import tcs
     from tcs.cli.values import current_state, frame_values, observed_settings
     from tcs.model.grid import Grid
-    from tcs.output.terminal.explanations import report_explanation
+    from tcs.output.terminal.explanations import report_explanation, report_explanations
     from tcs.output.words import explanation_in_words, goal_index_of_number
     from tcs.placement.reasons import fix_weights
 
     loaded = tcs.load(file)
-    explanation = tcs.explain(
+    explained = partial(
+        tcs.explain,
         loaded,
-        goal_index_of_number(loaded, goal),
-        configuration if here is None else current_state(here, torso, at or ()),
+        configuration=configuration if here is None else current_state(here, torso, at or ()),
         weights=fix_weights(
             Grid.from_dict(loaded.grid),
             metre=costs.metre_weight,
@@ -251,6 +254,16 @@ def explain(
         observed=observed_settings(observed or (), loaded.observed_axes),
         frames=frame_values(frames or ()),
     )
+    if goal is None:
+        if arm is not None:
+            raise typer.BadParameter("requires --goal.", param_hint="--arm")
+        every = [
+            explanation_in_words(loaded, explained(number))
+            for number in range(loaded.nominal.sets.weights.size)
+        ]
+        terminal.print_result({"goals": every}, report_explanations, as_json=as_json)
+        return
+    explanation = explained(goal_index_of_number(loaded, goal))
     if arm is not None:
         from tcs.placement.refinement.by_arm import explained_by_arm
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -12,6 +12,9 @@ from tcs.cli.options import expand_options
 from tcs.cli.serve import open_page
 from tcs.output import terminal
 from tcs.output.terminal import tables
+
+if TYPE_CHECKING:
+    from tcs.output.view import ScoreView
 
 
 @expand_options
@@ -48,27 +51,19 @@ def view(
         return
     if swept:
         raise typer.BadParameter("requires a plan.json.", param_hint="--swept")
-    here = chosen.state()
+    chosen.state()
     if page.export is None and not meshcat and not _names_a_set(chosen):
         open_page([file], window, jobs, command="view", first=_first_shown(chosen))
         return
 
-    import tcs
-    from tcs.output.view import make_score_view, show_score_view, write_score_view
-
-    loaded = tcs.load(file)
-    shown = make_score_view(
-        loaded,
-        here=here,
-        max_members=chosen.max_members,
-        observed=chosen.observation(loaded.observed_axes),
-        refined=chosen.refined,
-        meshes=page.meshes or page.export is None,
-    )
     if page.export is not None:
-        result = write_score_view(shown, page.export)
+        result = scene_page(file, page.export, chosen, meshes=page.meshes)
         terminal.print_result(result, tables.report_page, as_json=page.as_json)
         return
+
+    from tcs.output.view import show_score_view
+
+    shown = _score_view(file, chosen, meshes=True)
     show_score_view(
         shown,
         port=window.port,
@@ -76,6 +71,31 @@ def view(
         duration=window.duration,
         on_line=typer.echo,
         on_note=terminal.note,
+    )
+
+
+def scene_page(
+    file: Path, out: Path, chosen: options.ShownOptions, *, meshes: bool = False
+) -> dict[str, Any]:
+    """Write the scene in 3-D as a self-contained page and return what was written."""
+    from tcs.output.view import write_score_view
+
+    return write_score_view(_score_view(file, chosen, meshes=meshes), out)
+
+
+def _score_view(file: Path, chosen: options.ShownOptions, *, meshes: bool) -> ScoreView:
+    """Return the scene of a score file with a set, to be shown or written."""
+    import tcs
+    from tcs.output.view import make_score_view
+
+    loaded = tcs.load(file)
+    return make_score_view(
+        loaded,
+        here=chosen.state(),
+        max_members=chosen.max_members,
+        observed=chosen.observation(loaded.observed_axes),
+        refined=chosen.refined,
+        meshes=meshes,
     )
 
 

@@ -1,13 +1,15 @@
 """The catalogue: names and titles of the tasks, environments and robots included in `tcs`.
 
 Only headings are read. Checking a file against the models that it names takes seconds and is left
-to the functions that load it.
+to the functions that load it. `kind_of` tells which of them that is.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
+
+from pydantic import BaseModel
 
 from tcs.errors import DataFileError
 from tcs.files.documents import read_mapping
@@ -35,6 +37,61 @@ def check_names(task: str | None, environment: str, robot: str) -> None:
     ):
         if name is not None:
             DataFiles(noun, pattern).path(name)
+
+
+def kind_of(reference: str) -> str | None:
+    """Return what a model is: "task", "environment", "robot", "tool" or "person".
+
+    Args:
+        reference: Name of one that is included, or path of a YAML file, which is of the kind that
+            knows most of its keys.
+
+    Returns:
+        The kind; None if it is neither a name that is included nor a YAML file.
+
+    Raises:
+        DataFileError: If the file cannot be read or its keys are of no kind.
+    """
+    # Imported here: `tcs list` needs none of them.
+    from tcs.model.people import Person
+    from tcs.model.robots import RobotFile, robot_names, tool_names
+    from tcs.model.robots.held_tool import ToolFile
+    from tcs.model.scene import EnvironmentFile, environment_names
+    from tcs.model.tasks import task_names
+    from tcs.model.tasks.task_files import TaskFile
+
+    names = {
+        "task": task_names(),
+        "environment": environment_names(),
+        "robot": robot_names(),
+        "tool": tool_names(),
+    }
+    for kind, known in names.items():
+        if reference in known:
+            return kind
+    if Path(reference).suffix not in (".yaml", ".yml"):
+        return None
+    models: dict[str, type[BaseModel]] = {
+        "task": TaskFile,
+        "environment": EnvironmentFile,
+        "robot": RobotFile,
+        "tool": ToolFile,
+        "person": Person,
+    }
+    given = read_mapping(Path(reference), f"file '{reference}'", DataFileError, known=models).keys()
+    fields = {
+        kind: {*model.model_fields, *(field.alias for field in model.model_fields.values())}
+        for kind, model in models.items()
+    }
+    # Of what is based on another one, files have as few keys as they like.
+    counts = {kind: len(given & known) for kind, known in fields.items()}
+    kind = max(counts, key=lambda one: counts[one])
+    if not counts[kind]:
+        raise DataFileError(
+            f"file '{reference}' has no key of a task, an environment, a robot, a tool or a "
+            f"person, but: {', '.join(map(str, given))}. See docs/adding.md."
+        )
+    return kind
 
 
 def catalogue() -> dict[str, list[dict[str, Any]]]:

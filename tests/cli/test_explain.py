@@ -169,7 +169,7 @@ def test_bad_input_is_one_line(tcs_command, stored, words, message):
 @pytest.mark.parametrize(
     "words",
     [
-        pytest.param((), id="no goal"),
+        pytest.param(("--arm", "left"), id="arm of all goals"),
         pytest.param(("--goal", 1, "--configuration", 1, *HERE), id="two places"),
         pytest.param(("--goal", 1, "--torso", 0.1), id="torso of nothing"),
         pytest.param(("--goal", 1, *AT), id="bed of nothing"),

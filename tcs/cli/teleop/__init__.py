@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import typer
 
 from tcs.cli.teleop.driving import live
 from tcs.cli.teleop.replaying import replay, work
 from tcs.cli.teleop.trials import experiment, pick_and_place
 
+EXPERIMENTS: dict[str, Callable[..., None]] = {
+    "experiment": experiment,
+    "pick-and-place": pick_and_place,
+}
+"""Experiments with scripted operators, by name."""
+
 app = typer.Typer()
 app.callback(invoke_without_command=True)(live)
 app.command()(replay)
-app.command()(experiment)
-app.command("pick-and-place")(pick_and_place)
+for _name, _command in EXPERIMENTS.items():
+    app.command(_name)(_command)
 app.command()(work)
 
-__all__ = ["app"]
+__all__ = ["EXPERIMENTS", "app"]

@@ -32,6 +32,10 @@ MOST_PAIRS = 4
 thousand times as often as the arm, so one common list would show pairs of the base only."""
 
 
+_FROM_AFAR = (Reason.EXCLUDED, Reason.BODY_BLOCKED, Reason.TOO_FAR)
+"""Reasons of configurations from which the arm is not asked, which are most."""
+
+
 def report_explanation(result: Mapping[str, Any]) -> None:
     """Print an explanation, given as `Explanation.to_json` returns it."""
     out = results_console()
@@ -55,6 +59,33 @@ def report_explanation(result: Mapping[str, Any]) -> None:
     _print_fix(out, result)
     _print_reasons(out, result)
     _print_pairs(out, result)
+
+
+def report_explanations(result: Mapping[str, Any]) -> None:
+    """Print a line for each goal, given the explanations of all."""
+    out = results_console()
+    goals = result["goals"]
+    explained = goals[0]["explained"]
+    if explained is not None and explained["place"]:
+        out.print(f"From configuration {explained['configuration']}: {explained['place']}")
+    table = new_table(
+        "goal", "from there", ">configurations that reach it", "the others most often"
+    )
+    for one in goals:
+        here = one["explained"]
+        from_there = "" if here is None else "reached"
+        if here is not None and not here["reached"]:
+            from_there = REASON_NAMES[reason_of(here["reason"])]
+        near = [check for check in one["checks"] if reason_of(check["reason"]) not in _FROM_AFAR]
+        stopping = max(near, key=lambda check: check["stopped"])
+        table.add_row(
+            goal_text(one["goal"], one["goal_name"]),
+            from_there,
+            f"{one['reasons']['reached']:,}",
+            REASON_NAMES[reason_of(stopping["reason"])] if stopping["stopped"] else "",
+        )
+    out.print(table)
+    out.print("More about one of them, and the nearest change that reaches it: --goal NAME.")
 
 
 def _print_explained(out: Console, result: Mapping[str, Any]) -> None:
