@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from tcs.model.scene import Observation
     from tcs.motion import MotionPlan, evaluate, examine, plan
     from tcs.placement.constraints import Constraints, Obstacle, Region
+    from tcs.placement.parking import select
     from tcs.placement.population import Population, population
     from tcs.placement.reasons import Explanation, explain
     from tcs.placement.refinement import Placement, place, refine
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
         summary,
         verify,
     )
-    from tcs.placement.selection import Choice, Top, TravelWeights, UtilityWeights, select
+    from tcs.placement.selection import Choice, Top, TravelWeights, UtilityWeights
     from tcs.placement.store import ScoreFile
     from tcs.placement.store import load_scores as load
     from tcs.placement.store import save_scores as save
@@ -114,7 +115,7 @@ _HOMES = {
     "score": ("tcs.placement.scoring", "score"),
     "score_observed": ("tcs.placement.scoring", "score_observed"),
     "summary": ("tcs.placement.scoring", "summary"),
-    "select": ("tcs.placement.selection", "select"),
+    "select": ("tcs.placement.parking", "select"),
     "verify": ("tcs.placement.scoring", "verify"),
 }
 """Module and attribute of each public name."""

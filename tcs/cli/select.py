@@ -110,6 +110,15 @@ def select(
             "configurations that it examined.",
         ),
     ] = False,
+    parking: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,YAW_DEG",
+            help="By how much the robot may be off at every stop (m, m, deg): select only sets "
+            "that still do what they do then. Windows that FILE lacks are found by scoring base "
+            "poses around the stops, and kept in it.",
+        ),
+    ] = None,
     as_json: options.Json = False,
 ) -> None:
     """Select the recommended set; with weights, that of the greatest utility from --here.
@@ -119,9 +128,10 @@ def select(
     fewest stops. Each weight or penalty that is given makes the utility decide.
     """
     import tcs
-    from tcs.cli.values import current_state, frame_values, observed_settings
+    from tcs.cli.values import current_state, frame_values, observed_settings, parking_window
     from tcs.output.words import choice_in_words
     from tcs.placement.constraints import scored_entries
+    from tcs.placement.parking import find_windows
     from tcs.placement.selection import Executability, same_set
     from tcs.placement.store import motions_of
 
@@ -148,9 +158,14 @@ def select(
         max_members=max_members,
         observed=observed_settings(observed or (), loaded.observed_axes),
         frames=frame_values(frames or ()),
+        parking=parking_window(parking),
+        find_windows=partial(find_windows, on_compile=terminal.note_compiling),
     )
     motions = motions_of(loaded, file) if executable else None
-    choice = choose(here, motions=motions)
+    try:
+        choice = choose(here, motions=motions)
+    finally:
+        _keep_windows(file, loaded)
     for warning in choice.warnings:
         terminal.note(warning)
     result = choice_in_words(loaded, choice, here)
@@ -166,6 +181,20 @@ def select(
         }
     result |= scored_entries(loaded)
     terminal.print_result(result, tables.report_choice, as_json=as_json)
+
+
+def _keep_windows(path: Path, file: ScoreFile) -> None:
+    """Keep the windows that were found in the score file; without leave to write, say so."""
+    if all(table.known_windows is table.windows for table in file.tables):
+        return
+    import tcs
+    from tcs.errors import OutputError
+    from tcs.placement.parking import with_windows
+
+    try:
+        tcs.save(path, with_windows(file))
+    except OutputError as error:
+        terminal.note(f"The windows that were found are not kept: {error}")
 
 
 def _weights(**given: float | None) -> UtilityWeights | None:

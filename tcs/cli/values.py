@@ -60,6 +60,27 @@ def current_state(
     )
 
 
+def parking_window(text: str | None) -> tuple[float, ...] | None:
+    """Return a parking window given as "X,Y,YAW_DEG" [m, m, deg]; None without one.
+
+    Raises:
+        SelectionError: If it is not of that form.
+
+    >>> parking_window("0.05,0.05,3")
+    (0.05, 0.05, 3.0)
+    """
+    if text is None:
+        return None
+    try:
+        x, y, yaw_deg = map(float, text.split(","))
+    except ValueError:
+        raise SelectionError(
+            f"--parking is '{one_line(text)}'; must be half widths X,Y,YAW_DEG (m, m, deg), e.g. "
+            "0.05,0.05,3."
+        ) from None
+    return x, y, yaw_deg
+
+
 def settings(given: Sequence[str], option: str) -> dict[str, float]:
     """Return settings of axes given as "AXIS=VALUE" [m] or "AXIS_deg=VALUE" [deg], in m and rad.
 

@@ -21,7 +21,7 @@ from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.rebuild import made_from, rebuild_scenes
 from tcs.placement.selection import Choice
 from tcs.placement.store import ScoreFile
-from tcs.placement.tables import RefinedSet
+from tcs.placement.tables import RefinedSet, members_by_dexterity
 
 PLANNED = 0.5
 """Fraction of the progress of a stop that is planning; the rest is the re-check with Drake."""
@@ -296,8 +296,7 @@ def _by_dexterity(
         dexterity: Its dexterity there, shape (m, G).
         hand: Number of its hand there, shape (m, G).
     """
-    order = np.argsort(-dexterity, axis=0, kind="stable")
     return [
-        [(int(n), int(hand[n, goal])) for n in order[:, goal] if reached[n, goal]]
-        for goal in range(reached.shape[1])
+        [(n, int(hand[n, goal])) for n in able]
+        for goal, able in enumerate(members_by_dexterity(reached, dexterity))
     ]

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from tcs.errors import SelectionError, UnknownNameError
 from tcs.output.words.reasons import frame_name
-from tcs.placement.tables import Reason, ScoreTable
+from tcs.placement.tables import Reason, ScoreTable, members_by_dexterity
 
 if TYPE_CHECKING:
     from tcs.model.tasks import Goal
@@ -180,15 +178,9 @@ def assign_goals(scores: ScoreTable, members: Sequence[int]) -> tuple[int | None
         scores: Scores of the configurations.
         members: Flat indices of the set's configurations, in the order of the tour.
     """
-    if not members:
-        return (None,) * scores.goals
     rows = list(members)
-    reached = scores.reached[rows]
-    dexterity = np.where(reached, scores.dexterity[rows], -1.0)
-    best = dexterity.argmax(axis=0)
-    return tuple(
-        int(best[goal]) if reached[:, goal].any() else None for goal in range(scores.goals)
-    )
+    of_goals = members_by_dexterity(scores.reached[rows], scores.dexterity[rows])
+    return tuple(able[0] if able else None for able in of_goals)
 
 
 def assigned_goals(assignment: Sequence[int | None], member: int) -> tuple[int, ...]:

@@ -136,6 +136,11 @@ class PointScorer:
         found, hand = self._scores(points)
         return PointScores(found.reason == Reason.REACHED, found.dexterity, found.joints, hand)
 
+    @property
+    def has_pairs(self) -> bool:
+        """Whether two arms reach goals at the same time."""
+        return bool(self._together.pairs)
+
     def of_hand(self, hand: int) -> Self:
         """Return the scorer of the goals of one hand, numbered as those of the hand."""
         alone = self.hands[hand]
@@ -176,7 +181,7 @@ class PointScorer:
         scores = new_scores(len(points), self.goals)
         scores.reason[:], scores.contact[:] = Reason.EXCLUDED, -1
         hand = np.zeros(scores.reason.shape, np.uint8)
-        rows = np.flatnonzero(~self._forbidden(points))
+        rows = np.flatnonzero(~self.forbidden(points))
         if rows.size:
             chosen = points[rows]
             states, state = np.unique(chosen[:, : -len(ROBOT_AXES)], axis=0, return_inverse=True)
@@ -201,7 +206,7 @@ class PointScorer:
         """The hands, to check arms that work at the same time against each other."""
         return Hands.of([(hand.job, hand.lowered) for hand in self.hands], self.measure)
 
-    def _forbidden(self, points: FloatArray) -> BoolArray:
+    def forbidden(self, points: FloatArray) -> BoolArray:
         """Return which configurations stand on a forbidden region, shape (n,)."""
         base = self._columns(points, "base_x", "base_y", "base_yaw")
         forbidden = np.zeros(len(base), dtype=np.bool_)

@@ -126,6 +126,23 @@ class ApproachScorer:
 
         return approach_scene(self.problem)
 
+    def of_goals(self, problem: Problem, goals: Sequence[int]) -> ApproachScorer:
+        """Return the scorer of some of the goals, with the arranged shapes and memory of this one.
+
+        Args:
+            problem: The problem of this scorer with these goals alone, or with its environment in
+                other states.
+            goals: Numbers of the goals here.
+        """
+        some = list(goals)
+        lines = self.lines._replace(
+            offset=np.ascontiguousarray(self.lines.offset[some]),
+            fastest=np.ascontiguousarray(self.lines.fastest[some]),
+        )
+        found = ApproachScorer(problem, lines)
+        found.scene, found._of_thread = self.scene, self._of_thread
+        return found
+
     def warm_up(self) -> None:
         """Compile the kernel or load its machine code."""
         from tcs.kernel.approach.regions import warm_up

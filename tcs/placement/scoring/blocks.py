@@ -18,6 +18,7 @@ from tcs.files.compression import AtMost, compress, decompress
 from tcs.files.reading import read_text
 from tcs.files.writing import whole_file
 from tcs.kernel import cache
+from tcs.kernel.arrays import SceneArrays
 from tcs.model.scene import LoweredScene
 from tcs.placement.tables import Reason
 
@@ -160,15 +161,22 @@ class Manifest:
 
 
 def with_goals(lowered: LoweredScene, goals: Sequence[int]) -> LoweredScene:
-    """Return a scene with some of its goals, each a single pose."""
-    some = np.asarray(goals, dtype=np.intp)
-    arrays = lowered.arrays
-    return replace(
-        lowered,
-        arrays=arrays._replace(
-            goal_R=arrays.goal_R[:, some], goal_p=arrays.goal_p[:, some], first_pose=some[:0]
-        ),
-        goals=(),
+    """Return a scene with some of its goals."""
+    return replace(lowered, arrays=arrays_of_goals(lowered.arrays, goals), goals=())
+
+
+def arrays_of_goals(arrays: SceneArrays, goals: Sequence[int]) -> SceneArrays:
+    """Return the arrays of a scene with some of its goals."""
+    poses_of = [arrays.poses_of(goal) for goal in goals]
+    some = np.array([pose for poses in poses_of for pose in poses], dtype=np.intp)
+    first_pose = arrays.first_pose
+    if first_pose.size:
+        first_pose = np.cumsum([0, *map(len, poses_of)], dtype=np.int64)
+    return arrays._replace(
+        goal_R=arrays.goal_R[:, some],
+        goal_p=arrays.goal_p[:, some],
+        first_pose=first_pose,
+        freedom=arrays.freedom[some] if len(arrays.freedom) else arrays.freedom,
     )
 
 

@@ -11,6 +11,7 @@ from tcs.placement.selection.alternatives import Top
 from tcs.placement.selection.best import same_set, select
 from tcs.placement.selection.choice import Choice, SelectionTables
 from tcs.placement.selection.observed import Match, nearest_table
+from tcs.placement.selection.parked import ServedStop
 from tcs.placement.selection.travel import TravelWeights, shortest_tour
 from tcs.placement.selection.utility import PAPER_WEIGHTS, UtilityWeights, utility
 
@@ -20,6 +21,7 @@ __all__ = [
     "Executability",
     "Match",
     "SelectionTables",
+    "ServedStop",
     "Top",
     "TravelWeights",
     "UtilityWeights",

@@ -58,6 +58,13 @@ class CandidatePlaces(Protocol):
         """Number of the environment's state of each candidate, shape (C,)."""
 
 
+class AmongSets(Protocol):
+    """Admits some of the sets."""
+
+    def of_sets(self, members: tuple[IntArray, ...]) -> BoolArray:
+        """Return which sets it admits, given their members of shapes (n,), shape (n,)."""
+
+
 @dataclass(frozen=True, eq=False)
 class Distinct:
     """Sets that were offered; others are distinct if they differ from each of them.

@@ -22,7 +22,7 @@ from tcs.placement.selection.admission import (
     admitted_executable,
     motions_at,
 )
-from tcs.placement.selection.alternatives import Distinct, Top
+from tcs.placement.selection.alternatives import AmongSets, Distinct, Top
 from tcs.placement.selection.bounds import Bounds
 from tcs.placement.selection.branch_and_bound import best_set, tour_costs
 from tcs.placement.selection.choice import Choice, SelectionTables, changed_axes
@@ -34,6 +34,15 @@ from tcs.placement.selection.listed import (
     none_estimated,
 )
 from tcs.placement.selection.observed import Match, nearest_table
+from tcs.placement.selection.parked import (
+    FindsWindows,
+    ParkablePairs,
+    ServedStop,
+    Windows,
+    first_parked,
+    none_parked,
+    served_stops,
+)
 from tcs.placement.selection.penalties import Penalties, penalties_of
 from tcs.placement.selection.ranking import Ranking, ranking_of
 from tcs.placement.selection.travel import (
@@ -45,7 +54,7 @@ from tcs.placement.selection.travel import (
 )
 from tcs.placement.selection.utility import UtilityWeights, utility
 from tcs.placement.store import MotionFile, ScoreFile
-from tcs.placement.tables import RefinedTable, tc_manipulability, tc_reachability
+from tcs.placement.tables import RefinedTable, Window, tc_manipulability, tc_reachability
 from tcs.placement.tables.sets import MOST_MEMBERS
 from tcs.placement.tables.success import NO_MEMBER
 
@@ -70,6 +79,8 @@ def select(
     frames: Mapping[str, Sequence[float]] | None = None,
     motions: MotionFile | None = None,
     refined: bool = True,
+    parking: Sequence[float] | None = None,
+    find_windows: FindsWindows | None = None,
 ) -> Choice:
     """Return the recommended set, or with weights the stored set with the greatest utility.
 
@@ -105,6 +116,11 @@ def select(
         refined: Whether the refined sets of the file, by `tcs.refine`, are compared too. They are
             not, and a warning says so, where something is requested that only the sets of the grid
             answer: obstacles, preferences, limbs in several tables, motions, success under error.
+        parking: By how much the base may be off at every stop, in x [m], y [m] and heading [deg]:
+            only sets are selected from each of whose stops the goals that it serves are still
+            reached (and approached) then, as found by scoring base poses around it. None for 0.
+        find_windows: Who finds parking windows that the file does not hold yet; None for nobody.
+            `tcs.select` scores them.
 
     Raises:
         StoreMismatchError: If the motions were planned for other scores.
@@ -112,7 +128,8 @@ def select(
             of range or lacks an axis with a weight, or is not given although `keep` needs it,
             `max_members` is not stored, no set is reachable around the furniture or satisfies the
             constraints, or delta is above 0 and no set has an estimate, or no triple although
-            `max_members` is 3.
+            `max_members` is 3, or no set holds the parking window, or it is requested together
+            with what it was not scored for.
         UnknownNameError: If an axis has no such name.
         GridError: If a condition of the constraints has the unit of another axis, or excludes
             every value of its axis.
@@ -165,12 +182,24 @@ def select(
     # Estimates count every goal that a posture reaches.
     ranking = ranked(estimated=tables.success is not None and motions is None)
     disliked = _disliked(constraints.prefer, tables)
-    query = _Query(tables, index, here, legs, ranking, max_members, found, disliked)
+    windows = None
+    # Windows are of the scene as it was scored.
+    if match is not None and isinstance(scores, ScoreFile) and not _is_changed(constraints, limbs):
+        windows = Windows(scores, match.index, find_windows)
+    query = _Query(tables, index, here, legs, ranking, max_members, found, disliked, windows)
     if weights is None and ranking.basis == "success" and not query.has_estimated:
         query = replace(query, ranking=ranked(estimated=False))
     if tables.refined is not None and refined and query.lacks_estimates(tables.refined):
         of_grid = [*of_grid, "success under error"]
-    offered = query.offered(top)
+    parked = None
+    if parking is not None:
+        if top is not None:
+            raise SelectionError("parking selects one set. Leave 'top' out, or the parking window.")
+        query = replace(query, least=Window.wanted(parking))
+        parked, rows = query.parked()
+        offered = [rows]
+    else:
+        offered = query.offered(top)
     if not offered:
         raise none_estimated(max_members)
     best, *others = (query.choice(rows) for rows in offered)
@@ -183,9 +212,13 @@ def select(
         outside = warning_outside(legs, here, cells, tables.grid)
     if outside is not None:
         warnings = (outside, *warnings)
-    fewer = query.best(None, len(best.members) - 1) if len(best.members) > 1 else None
+    fewer = None
+    # One with fewer members need not have the windows.
+    if len(best.members) > 1 and parking is None:
+        fewer = query.best(None, len(best.members) - 1)
     return replace(
         best,
+        parked=parked,
         warnings=(*best.warnings, *warnings),
         alternatives=tuple(others),
         fewer=None if fewer is None else query.choice(fewer),
@@ -193,6 +226,11 @@ def select(
         match=match,
         seconds=time.perf_counter() - start,
     )
+
+
+def _is_changed(constraints: Constraints, limbs: bool) -> bool:
+    """Return whether a selection is in another scene than the one that was scored."""
+    return limbs or bool(constraints.blocked or constraints.forbid)
 
 
 def _disliked(
@@ -256,6 +294,44 @@ class _Query:
     """The candidates that satisfy the constraints; None without constraints."""
     disliked: tuple[NDArray[np.bool_], ...]
     """Whether a candidate violates each of the preferences, shapes (C,)."""
+    windows: Windows | None = None
+    """Parking windows of the stops; None where they are not of this scene."""
+    least: Window | None = None
+    """The window that every stop must have."""
+
+    def parked(self) -> tuple[int, tuple[int, ...]]:
+        """Return how many sets were looked at, and the best set whose stops have a window.
+
+        Raises:
+            SelectionError: If none has, or windows are not of this scene.
+        """
+        least = self.least
+        assert least is not None, "windows are requested"
+        if self.windows is None:
+            raise SelectionError(
+                "parking: windows are of the scene as it was scored, without further obstacles and "
+                "forbidden regions, the person as in one table. Score it with these, then select."
+            )
+        pairs = ParkablePairs.of(self.index, self.scores, self.windows.known, least)
+        walk = first_parked(
+            lambda found, among: replace(self, found=found).best(among, self.max_members),
+            self.stops_of,
+            pairs,
+            self.found,
+            self.windows,
+            least,
+        )
+        if walk.rows is not None:
+            return walk.looked, walk.rows
+        raise none_parked(walk, self.windows, least, self.stops_of)
+
+    def stops_of(self, rows: tuple[int, ...]) -> list[ServedStop]:
+        """Return the stops of a set of candidates with the goals that they serve."""
+        member, legs = np.array(rows), self.legs
+        between = legs.between(member[:, None], member[None, :])
+        _, order = shortest_tour(legs.from_here_to(member).tolist(), between)
+        reached, dexterity = (of_all[member] for of_all in self.scores)
+        return served_stops(self.index.values_of(member), reached, dexterity, order)
 
     def offered(self, top: Top | None) -> list[tuple[int, ...]]:
         """Return the best set, and further ones that differ from it and from each other."""
@@ -270,7 +346,7 @@ class _Query:
             offered.append(found)
         return offered
 
-    def best(self, distinct: Distinct | None, max_members: int) -> tuple[int, ...] | None:
+    def best(self, distinct: AmongSets | None, max_members: int) -> tuple[int, ...] | None:
         """Return the candidate numbers of the best set, the first among equals.
 
         Args:
@@ -298,7 +374,7 @@ class _Query:
         """Return whether the success decides, and that of the refined sets is not known."""
         return self.ranking.weights.success > 0.0 and refined.success is None
 
-    def _best_kept(self, distinct: Distinct | None, max_members: int) -> tuple[int, ...] | None:
+    def _best_kept(self, distinct: AmongSets | None, max_members: int) -> tuple[int, ...] | None:
         """Return the best of the kept sets of the grid; as `best`."""
         legs, weights, to_gain = self.legs, self.ranking.weights, self.ranking.to_gain
         singles = self.singles.copy()
@@ -322,7 +398,7 @@ class _Query:
     def _best_listed(
         self,
         listed: ListedSets,
-        distinct: Distinct | None,
+        distinct: AmongSets | None,
         max_members: int,
         to_beat: tuple[int, ...] | None = None,
     ) -> tuple[int, ...] | None:
@@ -466,6 +542,9 @@ class _Query:
             hands=tables.hands_of(np.where(self.scores[0][member], index.served[member], 0))
             if tables.hand_names
             else (),
+            windows=()
+            if self.windows is None or self.windows.known is None
+            else tuple(self.windows.known_window(stop, self.least) for stop in self.stops_of(rows)),
             seconds=0.0,
         )
 

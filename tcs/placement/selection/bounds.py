@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.placement.selection.admission import Admitted
-from tcs.placement.selection.alternatives import Distinct
+from tcs.placement.selection.alternatives import AmongSets
 from tcs.placement.selection.index import GroupIndex, SetIndex
 from tcs.placement.selection.penalties import Penalties
 from tcs.placement.selection.travel import Legs
@@ -43,7 +43,7 @@ class Bounds:
     blocked solutions are not greater than the stored ones, so the bounds hold for both."""
     penalties: Penalties | None = None
     """Penalties of the sets, if there are any."""
-    distinct: Distinct | None = None
+    distinct: AmongSets | None = None
     """Sets from which others must differ, if there are any."""
 
     @property

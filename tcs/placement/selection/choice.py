@@ -17,7 +17,7 @@ from tcs.placement.selection.index import SetIndex
 from tcs.placement.selection.observed import Match
 from tcs.placement.store import ScoreFile
 from tcs.placement.store.robot_shapes import RobotShapes
-from tcs.placement.tables import RefinedTable, ScoreTable, SetTable, SuccessTable
+from tcs.placement.tables import RefinedTable, ScoreTable, SetTable, SuccessTable, Window
 
 Basis = Literal["success", "goals", "utility"]
 """What decides: the success under error; most goals, fewest members, greatest P_M; the utility."""
@@ -223,6 +223,11 @@ class Choice:
     hands: tuple[tuple[str | None, ...], ...] = ()
     """For each of `members` the name of the hand that serves each goal, None for a goal it does not
     reach; () in a file of one hand."""
+    windows: tuple[Window | None, ...] = ()
+    """For each of `members` how far it may be off so that it still serves its goals, None where
+    that is not known; () where it is of none."""
+    parked: int | None = None
+    """Number of sets whose windows were looked at, if windows were requested."""
 
     def to_json(self, measure: str) -> dict[str, Any]:
         """Return the choice as plain containers, as printed by `tcs select --json`.
@@ -256,6 +261,8 @@ class Choice:
             plain |= self.match.to_json()
         if self.refined is not None:
             plain["refined"] = self.refined
+        if self.parked is not None:
+            plain["sets_looked_at"] = self.parked
         if self.constraints:
             plain["constraints"] = [left.to_json() for left in self.constraints]
         if self.footprint is not None:
@@ -272,12 +279,14 @@ class Choice:
         """Return the members as plain containers, in the order of the tour.
 
         In a file of several hands `hand` is, for each goal, the name of the hand that serves it
-        from there, null where it is not reached.
+        from there, null where it is not reached. `window` is there if the window is known.
         """
         plain: list[dict[str, Any]] = [{**self.members[i].to_json()} for i in self.order]
         for member, i in zip(plain, self.order, strict=True):
             if self.hands:
                 member["hand"] = list(self.hands[i])
+            if self.windows and (window := self.windows[i]) is not None:
+                member["window"] = window.to_json()
         return plain
 
     def compared_with(self, best: Choice) -> dict[str, Any]:

@@ -130,6 +130,33 @@ class SetIndex:
             "around": LatticeDistances(xy, self.sets.lattice, origin),
         }
 
+    def values_of(self, candidates: IntArray) -> FloatArray:
+        """Return the values of the grid's axes of candidates [m or rad], shape (n, axes)."""
+        values = np.empty((len(candidates), len(self.grid.axes)))
+        on_grid = candidates < self.on_grid
+        of_grid = self.grid.values(self.flat[candidates[on_grid]])
+        values[on_grid] = np.stack([*of_grid.values()], axis=1)
+        values[~on_grid] = self.off_grid[candidates[~on_grid] - self.on_grid]
+        return values
+
+    def rows_at(self, values: FloatArray) -> list[IntArray]:
+        """Return the candidates with given values of the axes, shape (n, axes): those of each."""
+        along = [
+            np.abs(axis.values - column[:, None]).argmin(axis=1)
+            for axis, column in zip(self.grid.axes, values.T, strict=True)
+        ]
+        flat = np.ravel_multi_index(along, self.grid.shape) if len(values) else np.empty(0, int)
+        row = np.minimum(np.searchsorted(self.sets.candidates, flat), self.on_grid - 1)
+        same = np.all(np.abs(self.values_of(row) - values) <= 1e-9, axis=1).tolist()
+        off_grid = [
+            self.on_grid + np.flatnonzero(np.all(np.abs(self.off_grid - at) <= 1e-9, axis=1))
+            for at in values
+        ]
+        return [
+            np.append(others, one) if found else others
+            for one, found, others in zip(row, same, off_grid, strict=True)
+        ]
+
     def configuration(self, candidate: int) -> InitialConfiguration:
         """Return a candidate as a configuration."""
         if candidate < self.on_grid:

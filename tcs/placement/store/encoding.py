@@ -44,6 +44,7 @@ from tcs.placement.tables import (
     ScoreTable,
     SetTable,
     SuccessTable,
+    WindowTable,
 )
 from tcs.placement.tables.columns import ArrayTable
 from tcs.placement.tables.sets import MOVES, Groups
@@ -72,6 +73,7 @@ def encode(file: ScoreFile) -> dict[str, Any]:
                 "scores": _encode_scores(table.scores, table.sets),
                 "success": None if table.success is None else encode_columns(table.success),
                 "refined": _encode_refined(table.refined),
+                "windows": None if table.windows is None else encode_columns(table.windows),
             }
             for table in file.tables
         ],
@@ -117,7 +119,9 @@ def _decode_table(encoded: dict[str, Any], grid: Grid, path: Path | None) -> Sta
     scores = _dict(encoded.get("scores"), "scores")
     success = _decode_if(SuccessTable, encoded.get("success"), "estimates of success")
     refined = _decode_refined(encoded.get("refined"), sets.weights)
-    return StateTables(sets, partial(_read_scores, scores, sets, grid.size, path), success, refined)
+    windows = _decode_if(WindowTable, encoded.get("windows"), "parking windows")
+    read_scores = partial(_read_scores, scores, sets, grid.size, path)
+    return StateTables(sets, read_scores, success, refined, windows)
 
 
 def _read_scores(

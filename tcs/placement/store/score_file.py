@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
 from typing import Any, Self
 
@@ -16,7 +16,7 @@ from tcs.errors import SelectionError, StoreError
 from tcs.files.plain import plain
 from tcs.model.grid import Axis, Grid
 from tcs.placement.store.robot_shapes import RobotShapes
-from tcs.placement.tables import RefinedTable, ScoreTable, SetTable, SuccessTable
+from tcs.placement.tables import RefinedTable, ScoreTable, SetTable, SuccessTable, WindowTable
 from tcs.placement.tables.sets import DISTANCE_TOLERANCE, candidates_of
 from tcs.placement.tables.success import NO_MEMBER
 
@@ -56,6 +56,9 @@ PAPER = "paper"
 """Entry of the metadata, true where a file was scored as the papers score tasks: each goal at its
 own pose alone, without approach; what is done with the file later counts contacts as they do."""
 
+WINDOWS = "windows"
+"""Name of the parking windows among what is derived from tables."""
+
 MAX_TABLES = 1000
 """Greatest number of observed states in a file; the tables of one take some megabytes."""
 
@@ -76,6 +79,8 @@ class StateTables:
     """Estimated success of some of the sets under error, if `tcs robustify` estimated it."""
     refined: RefinedTable | None = None
     """Sets refined between the grid points, if `tcs refine` refined any."""
+    windows: WindowTable | None = None
+    """Parking windows of some of the stops, if `tcs select --parking` found any."""
 
     @classmethod
     def of(cls, scores: ScoreTable, sets: SetTable) -> Self:
@@ -101,6 +106,20 @@ class StateTables:
     def derived(self) -> dict[str, Any]:
         """What other packages derived from the tables, by name, kept while the tables live."""
         return {}
+
+    @property
+    def known_windows(self) -> WindowTable | None:
+        """The parking windows, with those that were found since the file was read."""
+        found: WindowTable | None = self.derived.get(WINDOWS, self.windows)
+        return found
+
+    def keep_windows(self, windows: WindowTable) -> None:
+        """Keep windows that were found while the tables live."""
+        self.derived[WINDOWS] = windows
+
+    def with_known_windows(self) -> Self:
+        """Return the tables with the windows that were found as stored ones."""
+        return replace(self, windows=self.known_windows)
 
     @property
     def refined_sets(self) -> RefinedTable:
@@ -264,6 +283,7 @@ class ScoreFile:
                 raise StoreError("sets have another number of environment states than the grid.")
             _check_success(table.success, sets)
             _check_refined(table.refined, sets, grid)
+            _check_windows(table.windows, sets, grid)
             places = grid.values(sets.candidates)
             for column, name in enumerate(("base_x", "base_y")):
                 gap = np.abs(sets.cell_xy[sets.cell, column] - places[name])
@@ -394,6 +414,14 @@ def _check_refined(refined: RefinedTable | None, sets: SetTable, grid: Grid) -> 
         or not np.array_equal(refined.weights, sets.weights)
     ):
         raise StoreError("refined sets that do not belong to the sets of the table.")
+
+
+def _check_windows(windows: WindowTable | None, sets: SetTable, grid: Grid) -> None:
+    """Check that the windows are of stops of the grid's axes that serve goals of the table."""
+    if windows is None:
+        return
+    if windows.values.shape[1] != len(grid.axes) or windows.goals.shape[1] != sets.weights.size:
+        raise StoreError("parking windows that do not belong to the sets of the table.")
 
 
 def _has_a_frame(goal: object) -> bool:

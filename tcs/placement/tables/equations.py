@@ -56,6 +56,26 @@ def tc_manipulability(
     return total
 
 
+def members_by_dexterity(
+    reached: NDArray[np.bool_], dexterity: NDArray[np.float32]
+) -> list[list[int]]:
+    """Return the members of a set that reach each goal, the most dexterous first.
+
+    The first one serves the goal; the dexterity of a goal that is reached may be 0. Of equal
+    members the first in the order of the visits comes first.
+
+    Args:
+        reached: Whether a member reaches a goal, shape (m, G).
+        dexterity: Its dexterity there, shape (m, G).
+
+    >>> reached = np.array([[True, False], [True, False]])
+    >>> members_by_dexterity(reached, np.array([[0.1, 0.0], [0.2, 0.0]], np.float32))
+    [[1, 0], []]
+    """
+    order = np.argsort(-dexterity, axis=0, kind="stable")
+    return [[int(n) for n in of_goal if reached[n, g]] for g, of_goal in enumerate(order.T)]
+
+
 def float32_above(values: NDArray[np.float64]) -> NDArray[np.float32]:
     """Return the least float32 not below each value: a bound must not round down.
 
