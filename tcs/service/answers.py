@@ -65,6 +65,7 @@ class Answers:
                 max_members=request.max_members,
                 observed=observed_of(request.observed, file.observed_axes),
                 frames=request.frames,
+                parking=request.parking,
             )
             choice = choose(motions=motions)
             result = {**choice_in_words(file, choice, here), **scored_entries(file)}

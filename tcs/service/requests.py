@@ -81,6 +81,9 @@ class SelectRequest(TravelCosts, Limited, Observed, State):
     environment_penalty: Number = 0.01
     preference_penalty: Number = 0.05
     max_members: Annotated[int, Field(strict=True, ge=1, le=3)] | None = None
+    parking: tuple[Number, Number, Number] | None = None
+    """By how much the robot may be off at every stop: x, y [m] and heading [deg]. Windows are those
+    that the file holds: `tcs select FILE --parking` finds them and keeps them there."""
     executable: Annotated[bool, Field(strict=True)] = False
     """Count only goals to which a job `motions` of this file found a motion."""
 

@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 
 import tcs
+from tcs.errors import OutputError
+from tcs.placement import parking
+from tcs.placement.parking import with_windows
 from tcs.placement.store import StateTables
 from tests.chosen import some_of
-from tests.placement.store.example import SHIFT, score_file
+from tests.placement.store.example import SHIFT, known_everywhere, score_file
 
 HERE = ("--here", "0.5", "-1", "90")
 
@@ -372,3 +375,49 @@ def test_constraints_of_a_file_are_added(tcs_command, small_file, tmp_path):
         "only base_x <= 0",
         "only bed_height = 0",
     ]
+
+
+def test_windows_of_the_file_are_requested_and_shown(tcs_command, tmp_path):
+    path, file = tmp_path / "windows.tcs", score_file()
+    best = tcs.select(file)
+    tcs.select(file, parking=(0.05, 0.05, 3), find_windows=known_everywhere)
+    tcs.save(path, with_windows(file))
+    before = path.read_bytes()
+    result = tcs_command("select", path, "--parking", "0.05,0.05,3", "--json").json
+    assert result["parking"] == {"x": 0.05, "y": 0.05, "yaw_deg": 3.0, "sets_looked_at": 1}
+    assert result["configurations"] == [best.indices[i] for i in best.order]
+    windows = [member["window"] for member in result["members"]]
+    assert windows == [{"x": 0.08, "y": 0.062, "yaw_deg": 5.0}] * len(best.members)
+    text = tcs_command("select", path).out
+    assert "Stop 1 may stand up to 8 cm off in x, 6 cm in y, 5 degrees in heading." in text
+    # Nothing was found that the file did not hold: it is not written again.
+    assert path.read_bytes() == before
+
+
+def test_windows_that_are_found_are_kept_in_the_file(tcs_command, small_file, monkeypatch):
+    monkeypatch.setattr(parking, "find_windows", known_everywhere)
+    assert tcs_command("select", small_file, "--parking", "0.05,0.05,3").code == 0
+    monkeypatch.setattr(parking, "find_windows", lambda *_, **__: pytest.fail("it is known"))
+    again = tcs_command("select", small_file, "--parking", "0.05,0.05,3", "--json").json
+    assert all(member["window"]["x"] == 0.08 for member in again["members"])
+
+
+def test_a_file_that_cannot_be_written_is_selected_from_all_the_same(
+    tcs_command, small_file, monkeypatch
+):
+    def refuse(path, file):
+        raise OutputError(f"'{path}' cannot be written.")
+
+    monkeypatch.setattr(parking, "find_windows", known_everywhere)
+    monkeypatch.setattr(tcs, "save", refuse)
+    ran = tcs_command("select", small_file, "--parking", "0.05,0.05,3", "--json")
+    assert ran.code == 0
+    assert "not kept" in ran.err
+    assert all("window" in member for member in ran.json["members"])
+
+
+@pytest.mark.parametrize("wrong", ["0.05", "0.05,0.05", "a,b,c", "0.05,0.05,200", "nan,0,0"])
+def test_parking_is_three_half_widths(tcs_command, small_file, wrong):
+    ran = tcs_command("select", small_file, "--parking", wrong)
+    assert ran.code == 1
+    assert "half widths" in ran.err

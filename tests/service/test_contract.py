@@ -14,8 +14,11 @@ import numpy as np
 import pytest
 from anyio.from_thread import start_blocking_portal
 
+import tcs
 import tcs.errors
 from tcs.errors import BusyError, NotFoundError, StoreError, TcsError
+from tcs.output.words import choice_in_words
+from tcs.placement.parking import with_windows
 from tcs.placement.store import save_scores
 from tcs.placement.tables import Reason, tc_manipulability, tc_reachability
 from tcs.service import (
@@ -43,7 +46,7 @@ from tcs.service.operations import OPERATIONS
 from tcs.service.ros import FrameNames
 from tcs.service.ros.ros1 import Ros1Node
 from tcs.service.ros.ros1_types import ros1_modules, ros1_types
-from tests.placement.store.example import METADATA, score_file
+from tests.placement.store.example import METADATA, known_everywhere, score_file
 from tests.service.ros2_peer import ros2_peers
 
 # What is tested is what happens in the processes, or put in its place.
@@ -248,6 +251,25 @@ def test_select_has_the_keys_of_the_command(service, file, content, tcs_json):
     expected = tcs_json("select", "--here", *HERE, "--at", "bed_height=0", "--top", 2)
     answer.pop("seconds"), expected.pop("seconds")
     assert answer == expected
+
+
+def test_windows_of_the_file_are_those_of_the_command(service, tmp_path):
+    held = score_file()
+    tcs.select(held, parking=(0.05, 0.05, 3.0), find_windows=known_everywhere)
+    path = tmp_path / "windows.tcs"
+    save_scores(path, with_windows(held))
+    file = service.add_file(path.read_bytes()).file
+    answer = service.select(SelectRequest(file=file, parking=(0.05, 0.05, 3.0)))
+    choice = tcs.select(held, parking=(0.05, 0.05, 3.0))
+    expected = choice_in_words(held, choice, None)
+    answer.pop("seconds"), expected.pop("seconds")
+    assert answer == expected
+    assert all(member["window"]["yaw_deg"] == 5.0 for member in answer["members"])
+
+
+def test_windows_that_the_file_lacks_are_not_found(service, file):
+    with pytest.raises(TcsError, match="not known yet"):
+        service.select(SelectRequest(file=file, parking=(0.05, 0.05, 3.0)))
 
 
 def test_explain_has_the_keys_of_the_command(service, file, tcs_json):

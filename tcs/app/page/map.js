@@ -166,6 +166,11 @@ export class FloorMap {
     this.stops.replaceChildren();
     members.forEach((member, i) => {
       const at = `translate(${member.base_x} ${-member.base_y}) rotate(${-member.base_yaw_deg})`;
+      if (member.window) {
+        const { x, y } = member.window;
+        element("rect", { x: member.base_x - x, y: -member.base_y - y, width: 2 * x, height: 2 * y, class: "window", fill: "#b3003b33",
+          stroke: "#b3003b", "stroke-width": 0.012 }, this.stops);
+      }
       element("polygon", { points: points(this.base), transform: at, fill: "none", stroke: "#b3003b", "stroke-width": 0.03 }, this.stops);
       element("text", { x: member.base_x, y: -member.base_y + 0.07, "font-size": 0.22, "text-anchor": "middle", fill: "#b3003b",
         stroke: "#fff", "stroke-width": 0.05, "paint-order": "stroke" }, this.stops, i + 1);

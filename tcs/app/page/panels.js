@@ -98,6 +98,12 @@ export function showCards(choices, onGo, onShow) {
     if (choice.refined !== undefined) made("p", t("refinedSet"), card);
     card.onpointerenter = () => onShow(choice);
     choice.members.forEach((member, i) => {
+      if (member.window) {
+        const { x, y, yaw_deg: yaw } = member.window;
+        // Rounded down: nothing is promised that was not checked.
+        const [cm, deg] = [(half) => Math.floor(100 * half + 1e-6), Math.floor(yaw + 1e-6)];
+        made("p", t("window", { number: i + 1, x: cm(x), y: cm(y), yaw: deg }), card);
+      }
       const button = made("button", t("go", { number: i + 1 }), card, { type: "button" });
       button.onclick = () => onGo(member);
       button.onfocus = () => onShow(choice);

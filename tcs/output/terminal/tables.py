@@ -15,6 +15,7 @@ from tcs.output.terminal.console import results_console
 from tcs.output.words import (
     HAND,
     REASON_TEXTS,
+    WINDOW,
     axis_name,
     axis_title,
     axis_value,
@@ -32,6 +33,7 @@ from tcs.output.words import (
     scores_text,
     settings_text,
     stop_places,
+    stop_windows,
 )
 from tcs.output.words.verification import check_lines
 
@@ -211,6 +213,8 @@ def report_choice(result: Mapping[str, Any]) -> None:
     for line in stop_places(result["places"]):
         out.print(line)
     out.print(members_table(result["members"]))
+    for line in stop_windows(result["members"]):
+        out.print(line)
     scores = scores_text(result["reachability"], result["manipulability"], result["measure"])
     travel = f", travel cost {result['cost']:.2f}"
     if result["here"] is None:
@@ -221,6 +225,9 @@ def report_choice(result: Mapping[str, Any]) -> None:
     )
     if "gain" in result:
         out.print(result["gain"])
+    if "parking" in result:
+        sets = result["parking"]["sets_looked_at"]
+        out.print(f"parking windows of {sets:,} set{'s' * (sets > 1)} were looked at")
     if "success" in result:
         low, high = result["success_ci95"]
         out.print(
@@ -333,8 +340,9 @@ def members_table(
     members: Sequence[Mapping[str, Any]], heading: str = "stop", names: Sequence[str] = ()
 ) -> Table:
     """Return configurations as a table, by name if they have names, else numbered."""
-    table = new_table(heading, *(f">{axis_title(key)}" for key in members[0]))
-    for number, member in enumerate(members):
+    shown = [{k: value for k, value in member.items() if k != WINDOW} for member in members]
+    table = new_table(heading, *(f">{axis_title(key)}" for key in shown[0]))
+    for number, member in enumerate(shown):
         cells = (axis_value(key, value) for key, value in member.items())
         table.add_row(names[number] if names else str(number + 1), *cells)
     return table

@@ -15,6 +15,7 @@ from tcs.output.words.answers import (
 )
 from tcs.output.words.configurations import (
     HAND,
+    WINDOW,
     axis_name,
     axis_title,
     axis_unit,
@@ -26,6 +27,7 @@ from tcs.output.words.configurations import (
     quantity,
     setting_text,
     settings_text,
+    stop_windows,
 )
 from tcs.output.words.goals import (
     assign_goals,
@@ -76,6 +78,7 @@ __all__ = [
     "REASON_COLOURS",
     "REASON_NAMES",
     "REASON_TEXTS",
+    "WINDOW",
     "RelativePlace",
     "assign_goals",
     "assigned_goals",
@@ -120,6 +123,7 @@ __all__ = [
     "settings_text",
     "signed",
     "stop_places",
+    "stop_windows",
     "summary_in_words",
     "text_of_goal",
 ]

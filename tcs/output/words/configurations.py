@@ -10,9 +10,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from tcs.output.words.reasons import frame_name
+from tcs.placement.tables import window_text
 
 HAND = "hand"
 """Key of the names of the hands that serve the goals, in files of several."""
+WINDOW = "window"
+"""Key of the parking window of a stop."""
 
 
 def axis_name(key: str) -> str:
@@ -103,11 +106,27 @@ def member_text(member: Mapping[str, Any]) -> str:
     rest = [
         f"{axis_name(key)} {quantity(key, value)}"
         for key, value in member.items()
-        if not key.startswith("base_") and key != HAND
+        if not key.startswith("base_") and key not in (HAND, WINDOW)
     ]
     if HAND in member:
         rest.append(hands_text(member[HAND]))
     return ", ".join([base_pose_text(member), *rest])
+
+
+def stop_windows(members: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return a sentence for each stop of a set whose parking window is known.
+
+    Args:
+        members: The members, as `tcs select --json` prints them.
+
+    >>> stop_windows([{"base_x": 1.4, "window": {"x": 0.04, "y": 0.06, "yaw_deg": 5.0}}])
+    ['Stop 1 may stand up to 4 cm off in x, 6 cm in y, 5 degrees in heading.']
+    """
+    return [
+        f"Stop {number} may stand up to {window_text(member[WINDOW])}."
+        for number, member in enumerate(members, start=1)
+        if WINDOW in member
+    ]
 
 
 def setting_text(key: str, value: float) -> str:

@@ -25,7 +25,7 @@ from tcs.placement.selection.admission import (
 from tcs.placement.selection.alternatives import AmongSets, Distinct, Top
 from tcs.placement.selection.bounds import Bounds
 from tcs.placement.selection.branch_and_bound import best_set, tour_costs
-from tcs.placement.selection.choice import Choice, SelectionTables, changed_axes
+from tcs.placement.selection.choice import Choice, Parked, SelectionTables, changed_axes
 from tcs.placement.selection.index import SetIndex
 from tcs.placement.selection.listed import (
     ListedSets,
@@ -218,7 +218,7 @@ def select(
         fewer = query.best(None, len(best.members) - 1)
     return replace(
         best,
-        parked=parked,
+        parking=parked,
         warnings=(*best.warnings, *warnings),
         alternatives=tuple(others),
         fewer=None if fewer is None else query.choice(fewer),
@@ -299,8 +299,8 @@ class _Query:
     least: Window | None = None
     """The window that every stop must have."""
 
-    def parked(self) -> tuple[int, tuple[int, ...]]:
-        """Return how many sets were looked at, and the best set whose stops have a window.
+    def parked(self) -> tuple[Parked, tuple[int, ...]]:
+        """Return what was requested, and the best set whose stops have the window.
 
         Raises:
             SelectionError: If none has, or windows are not of this scene.
@@ -322,7 +322,7 @@ class _Query:
             least,
         )
         if walk.rows is not None:
-            return walk.looked, walk.rows
+            return Parked(least, walk.looked), walk.rows
         raise none_parked(walk, self.windows, least, self.stops_of)
 
     def stops_of(self, rows: tuple[int, ...]) -> list[ServedStop]:

@@ -171,6 +171,20 @@ class Left:
         return plain if self.solutions is None else {**plain, "solutions": self.solutions}
 
 
+@dataclass(frozen=True, slots=True)
+class Parked:
+    """What windows were requested, and how they were met."""
+
+    least: Window
+    """What the windows of all stops hold."""
+    sets: int
+    """Number of sets whose windows were looked at, the selected one included."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as plain containers."""
+        return {**self.least.to_json(), "sets_looked_at": self.sets}
+
+
 @dataclass(frozen=True, kw_only=True)
 class Choice:
     """The set with the greatest utility, with its scores and cost."""
@@ -226,15 +240,16 @@ class Choice:
     windows: tuple[Window | None, ...] = ()
     """For each of `members` how far it may be off so that it still serves its goals, None where
     that is not known; () where it is of none."""
-    parked: int | None = None
-    """Number of sets whose windows were looked at, if windows were requested."""
+    parking: Parked | None = None
+    """What windows were requested, if any."""
 
     def to_json(self, measure: str) -> dict[str, Any]:
         """Return the choice as plain containers, as printed by `tcs select --json`.
 
         Members and their configuration indices are in the order of the tour. Keys of success,
         observation, refined set, constraints and warnings are there only if success was estimated,
-        the file has observed axes, a refined set is chosen, there are constraints or warnings;
+        the file has observed axes, a refined set is chosen, windows were requested, there are
+        constraints or warnings;
         `fewer`, the best set with fewer members, only beside a set of several.
 
         Args:
@@ -261,8 +276,8 @@ class Choice:
             plain |= self.match.to_json()
         if self.refined is not None:
             plain["refined"] = self.refined
-        if self.parked is not None:
-            plain["sets_looked_at"] = self.parked
+        if self.parking is not None:
+            plain["parking"] = self.parking.to_json()
         if self.constraints:
             plain["constraints"] = [left.to_json() for left in self.constraints]
         if self.footprint is not None:

@@ -14,7 +14,7 @@ from tcs.errors import SelectionError
 from tcs.placement.selection.admission import Admitted
 from tcs.placement.selection.index import SetIndex
 from tcs.placement.store import ScoreFile
-from tcs.placement.tables import Window, WindowTable, members_by_dexterity
+from tcs.placement.tables import Window, WindowTable, members_by_dexterity, window_text
 
 MOST_SETS = 100
 """Most sets whose windows are looked for; one that has none takes a tenth of a second."""
@@ -284,21 +284,16 @@ def none_parked(
     stops_of: Callable[[tuple[int, ...]], list[ServedStop]],
 ) -> SelectionError:
     """Return the error that no set has the windows, with those of the one that comes nearest."""
-    wanted, seen = window_text(least), ""
+    seen = ""
     if walk.nearest is not None:
         found = []
         for values, goals in stops_of(walk.nearest):
             window = windows.window(ServedStop(values, goals)) if goals.any() else None
             x, y = (values[windows.axes.index(name)] for name in ("base_x", "base_y"))
-            found.append(f"{window_text(window or Window(0.0, 0.0, 0.0))} at ({x:.2f}, {y:.2f}) m")
-        seen = f" The nearest to it: {'; '.join(found)}."
+            off = "less than 3 mm" if window is None else window_text(window.to_json())
+            found.append(f"({x:.2f}, {y:.2f}) m may be {off}")
+        seen = f" The nearest to it: the stop at {'; that at '.join(found)}."
     return SelectionError(
-        f"parking: of {walk.looked} sets looked at, the best ones first, none has windows of "
-        f"{wanted} at every stop.{seen} Ask for less, or allow more members."
+        f"parking: of {walk.looked} sets looked at, the best first, none may be "
+        f"{window_text(least.to_json())} at every stop.{seen} Ask for less, or for fewer goals."
     )
-
-
-def window_text(window: Window) -> str:
-    """Return a window in numbers."""
-    plain = window.to_json()
-    return f"x {plain['x']:.3f} m, y {plain['y']:.3f} m, heading {plain['yaw_deg']:.1f} deg"

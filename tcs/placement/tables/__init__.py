@@ -16,7 +16,7 @@ from tcs.placement.tables.refined import RefinedSet, RefinedTable
 from tcs.placement.tables.scores import Reason, ScoreTable
 from tcs.placement.tables.sets import BaseLattice, SetTable
 from tcs.placement.tables.success import Estimates, SuccessTable
-from tcs.placement.tables.windows import Window, WindowTable
+from tcs.placement.tables.windows import Window, WindowTable, window_text
 
 __all__ = [
     "BaseLattice",
@@ -34,4 +34,5 @@ __all__ = [
     "members_by_dexterity",
     "tc_manipulability",
     "tc_reachability",
+    "window_text",
 ]

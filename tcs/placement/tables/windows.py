@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple, Self
 
@@ -69,6 +69,30 @@ class Window(NamedTuple):
             "y": _down(self.y, 1e-4),
             "yaw_deg": _down(math.degrees(self.yaw), 1e-2),
         }
+
+
+def window_text(window: Mapping[str, float]) -> str:
+    """Return the half widths of a window in words, rounded down.
+
+    Args:
+        window: They, as `Window.to_json` returns them.
+
+    >>> window_text({"x": 0.0462, "y": 0.062, "yaw_deg": 5.73})
+    '4 cm off in x, 6 cm in y, 5 degrees in heading'
+    >>> window_text({"x": 0.008, "y": 0.5, "yaw_deg": 0.69})
+    '8 mm off in x, 50 cm in y, 0.6 degrees in heading'
+    """
+    x, y = (
+        f"{math.floor(100.0 * half + 1e-6)} cm"
+        if half >= 0.01
+        else f"{math.floor(1000.0 * half + 1e-6)} mm"
+        for half in (window["x"], window["y"])
+    )
+    yaw = window["yaw_deg"]
+    turn = (
+        f"{math.floor(yaw + 1e-6)}" if yaw >= 1.0 else f"{math.floor(10.0 * yaw + 1e-6) / 10.0:g}"
+    )
+    return f"{x} off in x, {y} in y, {turn} degree{'' if turn == '1' else 's'} in heading"
 
 
 def _down(value: float, step: float) -> float:

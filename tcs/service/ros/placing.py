@@ -15,7 +15,7 @@ from tcs.service.requests import JobRequest, PlanRequest, ScoreHereRequest, Sele
 from tcs.service.responses import FileEntry
 from tcs.service.ros.frames import FrameNames, Pose, TransformTree
 
-_BASE = ("base_x", "base_y", "base_yaw_deg", "torso", "hand")
+_BASE = ("base_x", "base_y", "base_yaw_deg", "torso", "hand", "window")
 _FROM_TF = ("file", "here", "torso", "at", "frames")
 
 

@@ -6,6 +6,7 @@ import math
 
 from tcs.placement.scoring.sets import build_sets
 from tcs.placement.store import ScoreFile, StateTables
+from tcs.placement.tables import WindowTable
 from tests.placement.tables.small import random_scores, small_grid
 
 METADATA = {
@@ -41,3 +42,9 @@ def score_file(*, grid=None, share=0.4, tables=1, options=None, **changes):
         ),
     }
     return ScoreFile(**(parts | changes))
+
+
+def known_everywhere(file, table, stop, least, on_compile=None):
+    """Find the same window around every stop."""
+    found = WindowTable.empty(stop.values.size, stop.goals.size)
+    return found.added(stop.values, stop.goals, (0.08, 0.062, math.radians(5.0)), held=True)
