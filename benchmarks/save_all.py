@@ -44,6 +44,10 @@ PARTS: dict[str, tuple[str, ...]] = {
         *("--pairs", "100"),
     ),
     "approach_search": (),
+    "parking": (
+        *(f"{SCORES}/shaving-wheelchair-pr2.tcs", f"{SCORES}/feeding-wheelchair-pr2.tcs"),
+        f"{SCORES}/bathing-bed-pr2.tcs",
+    ),
     "motions": (
         *(
             f"{SCORES}/{name}-pr2.tcs"

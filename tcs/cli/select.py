@@ -1,4 +1,4 @@
-"""The commands `tcs select` and `tcs explain`, which only read a score file."""
+"""The commands `tcs select` and `tcs explain`, which read a score file."""
 
 from __future__ import annotations
 
@@ -115,8 +115,8 @@ def select(
         typer.Option(
             metavar="X,Y,YAW_DEG",
             help="By how much the robot may be off at every stop (m, m, deg): select only sets "
-            "that still do what they do then. Windows that FILE lacks are found by scoring base "
-            "poses around the stops, and kept in it.",
+            "that still do what they do then; 0,0,0 only says how far it may be off. Windows that "
+            "FILE lacks are found by scoring base poses around the stops, and kept in it.",
         ),
     ] = None,
     as_json: options.Json = False,

@@ -123,7 +123,8 @@ def stop_windows(members: Sequence[Mapping[str, Any]]) -> list[str]:
     ['Stop 1 may stand up to 4 cm off in x, 6 cm in y, 5 degrees in heading.']
     """
     return [
-        f"Stop {number} may stand up to {window_text(member[WINDOW])}."
+        f"Stop {number} may stand {'up to ' * any(member[WINDOW].values())}"
+        f"{window_text(member[WINDOW])}."
         for number, member in enumerate(members, start=1)
         if WINDOW in member
     ]

@@ -11,14 +11,12 @@ from functools import cache
 import numpy as np
 
 from tcs.kernel.arrays import BoolArray, FloatArray
-from tcs.placement.tables.windows import MARGIN, MOST_PARKING, Window
+from tcs.placement.tables.windows import MARGIN, MOST_PARKING, NARROWEST, Window
 
 PROPORTIONS = Window(0.05, 0.05, math.radians(3.0))
 """Half widths of which a window has a multiple at first: what a navigation stack parks within."""
 WIDEST = Window.wanted(MOST_PARKING)
 """Greatest half widths."""
-NARROWEST = 1.0 / 16.0
-"""Multiple of these half widths below which there is no window: 3 mm."""
 FINENESS = 1.07
 """Ratio of a box that holds and one that does not at which the search is content."""
 COARSE, FINE = 5, 9
@@ -111,7 +109,7 @@ class WindowSearch:
             start = smaller
         box = self._grown(start)
         while True:
-            if any(one < NARROWEST * least for one, least in zip(box, PROPORTIONS, strict=True)):
+            if min(box.x, box.y) < NARROWEST / (1.0 - MARGIN):
                 return None
             if needed is not None and not box.holds(needed):
                 return None
@@ -124,7 +122,7 @@ class WindowSearch:
     def _shrunk_until_held(self, box: Window) -> Window | None:
         """Return a smaller box of the same proportions that holds, None if none does."""
         scale = 1.0
-        while scale > NARROWEST:
+        while min(box.x, box.y) * scale > NARROWEST / (1.0 - MARGIN):
             scale /= 2.0
             if self.holds(_scaled(box, scale)):
                 return _scaled(box, scale)

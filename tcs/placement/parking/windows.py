@@ -39,7 +39,8 @@ def find_windows(
         file: The score file.
         table: Number of the table.
         stop: The stop, and the goals that it serves.
-        least: What the window has to hold; None for the largest window that is found.
+        least: What the window has to hold; None for the largest window that is found, 0 where none
+            of 3 mm is.
         on_compile: Called first if the kernel has to be compiled.
 
     Raises:
@@ -53,6 +54,8 @@ def find_windows(
     search = WindowSearch(scored.missed, named_generator(0, "parking"))
     window = search.window(least)
     found = WindowTable.empty(stop.values.size, stop.goals.size)
+    if window is None and least is None:
+        window = Window(0.0, 0.0, 0.0)
     if window is not None:
         return found.added(stop.values, stop.goals, window, held=True)
     for number, goal in enumerate(goals.tolist()):

@@ -118,7 +118,8 @@ def select(
             answer: obstacles, preferences, limbs in several tables, motions, success under error.
         parking: By how much the base may be off at every stop, in x [m], y [m] and heading [deg]:
             only sets are selected from each of whose stops the goals that it serves are still
-            reached (and approached) then, as found by scoring base poses around it. None for 0.
+            reached (and approached) then, as found by scoring base poses around it. Of three times
+            0 the windows are found and none is required; None to find none.
         find_windows: Who finds parking windows that the file does not hold yet; None for nobody.
             `tcs.select` scores them.
 
@@ -195,9 +196,8 @@ def select(
     if parking is not None:
         if top is not None:
             raise SelectionError("parking selects one set. Leave 'top' out, or the parking window.")
-        query = replace(query, least=Window.wanted(parking))
-        parked, rows = query.parked()
-        offered = [rows]
+        query = replace(query, least=Window.wanted(parking) if any(parking) else None)
+        parked, offered = query.parked()
     else:
         offered = query.offered(top)
     if not offered:
@@ -299,19 +299,23 @@ class _Query:
     least: Window | None = None
     """The window that every stop must have."""
 
-    def parked(self) -> tuple[Parked, tuple[int, ...]]:
-        """Return what was requested, and the best set whose stops have the window.
+    def parked(self) -> tuple[Parked, list[tuple[int, ...]]]:
+        """Return what was requested, and the best set whose stops have the window, [] without any.
 
         Raises:
             SelectionError: If none has, or windows are not of this scene.
         """
-        least = self.least
-        assert least is not None, "windows are requested"
         if self.windows is None:
             raise SelectionError(
                 "parking: windows are of the scene as it was scored, without further obstacles and "
                 "forbidden regions, the person as in one table. Score it with these, then select."
             )
+        if (least := self.least) is None:
+            offered = self.offered(None)
+            for stop in self.stops_of(offered[0]) if offered else ():
+                if stop.goals.any():
+                    self.windows.window(stop)
+            return Parked(Window(0.0, 0.0, 0.0), 1), offered
         pairs = ParkablePairs.of(self.index, self.scores, self.windows.known, least)
         walk = first_parked(
             lambda found, among: replace(self, found=found).best(among, self.max_members),
@@ -322,8 +326,9 @@ class _Query:
             least,
         )
         if walk.rows is not None:
-            return Parked(least, walk.looked), walk.rows
-        raise none_parked(walk, self.windows, least, self.stops_of)
+            return Parked(least, walk.looked), [walk.rows]
+        nearest = walk.nearest or next(iter(self.offered(None)), None)
+        raise none_parked(walk.looked, nearest, self.windows, least, self.stops_of)
 
     def stops_of(self, rows: tuple[int, ...]) -> list[ServedStop]:
         """Return the stops of a set of candidates with the goals that they serve."""

@@ -278,22 +278,31 @@ def first_parked(
 
 
 def none_parked(
-    walk: ParkedSet,
+    looked: int,
+    nearest: tuple[int, ...] | None,
     windows: Windows,
     least: Window,
     stops_of: Callable[[tuple[int, ...]], list[ServedStop]],
 ) -> SelectionError:
-    """Return the error that no set has the windows, with those of the one that comes nearest."""
+    """Return the error that no set has the windows.
+
+    Args:
+        looked: Number of sets that were looked at.
+        nearest: The set whose windows are named; None for none.
+        windows: The windows.
+        least: What is wanted.
+        stops_of: Returns the stops of a set with the goals they serve.
+    """
     seen = ""
-    if walk.nearest is not None:
+    if nearest is not None:
         found = []
-        for values, goals in stops_of(walk.nearest):
-            window = windows.window(ServedStop(values, goals)) if goals.any() else None
+        for values, goals in stops_of(nearest):
+            if (window := windows.window(ServedStop(values, goals))) is None:
+                continue
             x, y = (values[windows.axes.index(name)] for name in ("base_x", "base_y"))
-            off = "less than 3 mm" if window is None else window_text(window.to_json())
-            found.append(f"({x:.2f}, {y:.2f}) m may be {off}")
-        seen = f" The nearest to it: the stop at {'; that at '.join(found)}."
+            found.append(f"({x:.2f}, {y:.2f}) m may be {window_text(window.to_json())}")
+        seen = f" Of the nearest to it, the stop at {'; that at '.join(found)}."
     return SelectionError(
-        f"parking: of {walk.looked} sets looked at, the best first, none may be "
-        f"{window_text(least.to_json())} at every stop.{seen} Ask for less, or for fewer goals."
+        f"parking: no set may be {window_text(least.to_json())} at every stop; {looked} were looked "
+        f"at, neighbours on the grid exclude others.{seen} Ask for less."
     )

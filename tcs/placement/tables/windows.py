@@ -20,6 +20,8 @@ MOST_PARKING = (0.5, 0.5, 180.0)
 """Greatest half widths [m, m, deg]: half a metre is the farthest that a navigation stack is off."""
 LEAST_PARKING = (0.005, 0.005, 0.3)
 """Least half widths that can be requested [m, m, deg]: less than any base is placed by."""
+NARROWEST = 0.003
+"""Least half width in x and y that is looked for [m]: no base is placed better."""
 SAME = 1e-9
 """Rounding of values of axes and of half widths [m or rad]."""
 
@@ -81,7 +83,11 @@ def window_text(window: Mapping[str, float]) -> str:
     '4 cm off in x, 6 cm in y, 5 degrees in heading'
     >>> window_text({"x": 0.008, "y": 0.5, "yaw_deg": 0.69})
     '8 mm off in x, 50 cm in y, 0.6 degrees in heading'
+    >>> window_text({"x": 0.0, "y": 0.0, "yaw_deg": 0.0})
+    'less than 3 mm off'
     """
+    if not any(window.values()):
+        return f"less than {1000.0 * NARROWEST:g} mm off"
     x, y = (
         f"{math.floor(100.0 * half + 1e-6)} cm"
         if half >= 0.01

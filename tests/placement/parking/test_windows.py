@@ -55,7 +55,7 @@ def widest_stop(file):
     for h, g in list(zip(rows.tolist(), goals.tolist(), strict=True))[:: max(1, len(rows) // 12)]:
         stop = stop_of(file, h, [g])
         window = find_windows(file, 0, stop, None).window(*stop)
-        if window is not None and (best is None or window.volume > best[1].volume):
+        if min(window) > 0.0 and (best is None or window.volume > best[1].volume):
             best = stop, window
     return best
 

@@ -38,10 +38,12 @@ class MadeUp:
     def __call__(self, file, table, stop, least):
         self.calls += 1
         scale, found = self.of(stop), WindowTable.empty(stop.values.size, 5)
-        least = WANTED if least is None else least
-        if np.all(scale[stop.goals] >= 1.0) or least is None:
+        wanted, least = least, WANTED if least is None else least
+        if np.all(scale[stop.goals] >= 1.0):
             half = scale[stop.goals].min() * np.array(least)
             return found.added(stop.values, stop.goals, half, held=True)
+        if wanted is None:
+            return found.added(stop.values, stop.goals, (0.0, 0.0, 0.0), held=True)
         for goal in np.flatnonzero(stop.goals & (scale < 1.0)):
             mask = np.arange(5) == goal
             found = found.added(stop.values, mask, 0.5 * np.array(least), held=False)
@@ -149,8 +151,9 @@ def test_without_any_the_error_names_the_nearest():
     with pytest.raises(SelectionError) as raised:
         select(file, parking=LEAST, find_windows=finder)
     text = str(raised.value)
-    assert "none may be 5 cm off in x, 5 cm in y, 3 degrees in heading at every stop" in text
-    assert "sets looked at" in text
+    assert "no set may be 5 cm off in x, 5 cm in y, 3 degrees in heading at every stop" in text
+    assert "Of the nearest to it, the stop at (" in text
+    assert "m may be less than 3 mm off" in text
     assert finder.calls <= 2 * MOST_SETS + 2
 
 
@@ -191,3 +194,15 @@ def test_a_window_that_was_asked_for_is_shown_rather_than_a_larger_one():
     assert parked.indices == best.indices
     assert parked.windows[0].holds(WANTED)
     assert dataclasses.replace(file).tables[0] is file.tables[0]
+
+
+def test_of_nothing_requested_the_best_set_is_shown_with_its_windows():
+    file, best = score_file(), select(score_file())
+    finder = MadeUp(file, 0, 1.0)
+    finder.scale[best.indices[0]] = 0.5
+    found = select(file, parking=(0.0, 0.0, 0.0), find_windows=finder)
+    assert found.indices == best.indices
+    assert found.windows[0] == Window(0.0, 0.0, 0.0)
+    assert all(min(window) > 0.0 for window in found.windows[1:])
+    assert select(file).windows == found.windows
+    assert found.parking.sets == 1
