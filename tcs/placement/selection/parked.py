@@ -303,6 +303,6 @@ def none_parked(
             found.append(f"({x:.2f}, {y:.2f}) m may be {window_text(window.to_json())}")
         seen = f" Of the nearest to it, the stop at {'; that at '.join(found)}."
     return SelectionError(
-        f"parking: no set may be {window_text(least.to_json())} at every stop; {looked} were looked "
-        f"at, neighbours on the grid exclude others.{seen} Ask for less."
+        f"parking: no set may be {window_text(least.to_json())} at every stop; {looked} were "
+        f"looked at, neighbours on the grid exclude others.{seen} Ask for less."
     )
