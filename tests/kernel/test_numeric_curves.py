@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tcs.kernel.dexterity import INVERSE_CONDITION, ISOTROPY
+from tcs.kernel.dexterity import INVERSE_CONDITION, ISOTROPY, LIMIT_WEIGHTED, MEASURES
 from tcs.kernel.kinematics import SMALL_ANGLE_COSINE
 from tcs.kernel.numeric.arm import CONTINUOUS_HALF_RANGE, WIDER, figures_at, numeric_arm
 from tcs.kernel.numeric.curves import new_curves, point_between, slack_of, trace
@@ -152,10 +152,26 @@ def test_newton_converges_to_the_goal(chain, rng):
     assert arrived >= 45
 
 
-@pytest.mark.parametrize("of", [ISOTROPY, INVERSE_CONDITION], ids=["isotropy", "condition"])
+ON_CURVES = {
+    ISOTROPY: plain_dexterity.isotropy,
+    INVERSE_CONDITION: plain_dexterity.inverse_condition,
+    # Its weights are added at each candidate.
+    LIMIT_WEIGHTED: plain_dexterity.isotropy,
+}
+"""Function of the Jacobian at the points of a curve, by its code."""
+
+
+def test_the_values_on_curves_are_known_for_every_measure():
+    unknown = {name for name, measure in MEASURES.items() if measure.of not in ON_CURVES}
+    assert not unknown, (
+        f"no value on curves for {sorted(unknown)}: compute it in `_append_point` of "
+        "tcs/kernel/numeric/curves.py, and name its function in ON_CURVES"
+    )
+
+
+@pytest.mark.parametrize("of", sorted(set(ON_CURVES) - {LIMIT_WEIGHTED}))
 def test_a_curve_holds_the_tool_still_from_point_to_point(chain, rng, of):
-    arm, newton, checked = numeric_arm(chain), new_newton_workspace(), 0
-    exact = plain_dexterity.isotropy if of == ISOTROPY else plain_dexterity.inverse_condition
+    arm, newton, checked, exact = numeric_arm(chain), new_newton_workspace(), 0, ON_CURVES[of]
     for _ in range(5):
         q = random_joints(rng, chain)
         to = pose(chain, q)

@@ -11,7 +11,14 @@ import numpy as np
 from scipy.linalg import null_space
 
 from tcs.kernel.arrays import FloatArray
-from tcs.kernel.dexterity import ISOTROPY, LIMIT_WEIGHTED, NORMALISED, UNLIMITED, dexterity
+from tcs.kernel.dexterity import (
+    INVERSE_CONDITION,
+    ISOTROPY,
+    LIMIT_WEIGHTED,
+    NORMALISED,
+    UNLIMITED,
+    dexterity,
+)
 
 
 def isotropy(J: FloatArray) -> float:
@@ -24,6 +31,10 @@ def inverse_condition(J: FloatArray) -> float:
     """Return ITCM thesis eq. (20): the least over the greatest singular value."""
     sigma = np.linalg.svd(J, compute_uv=False)
     return float(sigma.min() / sigma.max())
+
+
+_FUNCTIONS = {ISOTROPY: isotropy, INVERSE_CONDITION: inverse_condition}
+"""Function of the Jacobian, by its code in a measure."""
 
 
 def limit_penalty(q: FloatArray, lower: FloatArray, upper: FloatArray, penalty: int) -> float:
@@ -76,5 +87,5 @@ def measured(
     if of == LIMIT_WEIGHTED:
         weights = np.array([limit_weight(*joint) for joint in zip(q, lower, upper, strict=True)])
         return isotropy(J * np.sqrt(weights[-J.shape[1] :]))
-    value = isotropy(J) if of == ISOTROPY else inverse_condition(J)
+    value = _FUNCTIONS[of](J)
     return value * limit_penalty(q, lower, upper, penalty)

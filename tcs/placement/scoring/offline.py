@@ -214,8 +214,8 @@ def score(
         arms: Arm of the goals that name none: one of the robot's, e.g. "left", or "both", to reach
             each of them with the arm that reaches it best. By default the arm that the robot file
             describes.
-        measure: Dexterity measure to maximise at each goal: "isotropy", "inverse-condition", or
-            one of them with a penalty near joint limits, "-limited" or "-limited-thesis".
+        measure: Dexterity measure to maximise at each goal: "isotropy", "inverse-condition", one
+            of them with a penalty near joint limits, "-limited" or "-limited-thesis", or "jlwki".
             Equations: docs/method.md.
         jobs: Number of threads; the result does not depend on it.
         on_progress: Called with the number of scored configurations and their total.
