@@ -10,6 +10,8 @@ import tcs
 from tcs.kernel.dexterity import MEASURES
 from tcs.model.grid import Grid
 from tcs.model.robots import load_robot, robot_names
+from tcs.model.scene.environment.environment_file import SHAPES
+from tcs.model.scene.environment.model_files import CLOUDS, MESHES, SUFFIXES
 from tcs.output.report import CheckSizes, make_score_page, make_score_report
 from tcs.output.words.reasons import COLOUR_NAMES
 from tcs.placement.reasons import explain, fix_weights
@@ -86,6 +88,15 @@ def test_default_weights():
 
 def test_measures():
     assert names(rows(page("method"), "| name | value | function |")) == list(MEASURES)
+
+
+def test_types_of_obstacle_files():
+    listed = {row[0] for row in rows(page("scene"), "| key | what it is | shapes")}
+    files = {cell: set(re.findall(r"\.[a-z]+\b", cell)) for cell in listed if "file:" in cell}
+    known = {frozenset(SUFFIXES), frozenset(MESHES), frozenset(CLOUDS)}
+    assert {frozenset(endings) for endings in files.values()} == known
+    shapes = {match[1] for cell in listed if (match := re.match(r"`(\w+):", cell))}
+    assert shapes == set(SHAPES)
 
 
 def test_reasons():

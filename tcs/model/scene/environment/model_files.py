@@ -1,7 +1,7 @@
-"""Check a model file of an environment before Drake parses it.
+"""Types of the files that models and obstacles are read from, and the check of a model file.
 
 Drake ends the process for some numbers (an infinite size, a pose of NaN) and accepts others that no
-furniture has, so every number of the file is checked first.
+furniture has, so every number of a model file is checked before Drake parses it.
 """
 
 from __future__ import annotations

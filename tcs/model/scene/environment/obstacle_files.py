@@ -1,4 +1,4 @@
-"""Point clouds that obstacles are read from."""
+"""Point clouds that obstacles are read from; `tcs.model.robots.mesh_shapes` reads meshes."""
 
 from __future__ import annotations
 
