@@ -379,7 +379,10 @@ def export(
     ] = False,
     as_json: options.Json = False,
 ) -> None:
-    """Write scores as a CSV table, one row for each configuration that reaches a goal."""
+    """Write scores as a CSV table, one row for each configuration that reaches a goal.
+
+    Goals are numbered from 0 there: reason_0 and dexterity_0 are of goal 1 of `tcs explain`.
+    """
     result = exported(file, out, everything=everything)
     terminal.print_result(
         result, lambda _: typer.echo(f"wrote {out}: {result['rows']:,} rows"), as_json=as_json
