@@ -13,6 +13,7 @@ from tcs.model.robots import load_robot, robot_names
 from tcs.model.scene.environment.environment_file import SHAPES
 from tcs.model.scene.environment.model_files import CLOUDS, MESHES, SUFFIXES
 from tcs.output.report import CheckSizes, make_score_page, make_score_report
+from tcs.output.words import explanation_in_words
 from tcs.output.words.reasons import COLOUR_NAMES
 from tcs.placement.reasons import explain, fix_weights
 from tcs.placement.selection import TravelWeights, UtilityWeights
@@ -55,9 +56,14 @@ def test_top_level_of_a_score_file():
 
 
 def test_json_of_an_explanation():
-    listed = names(rows(page("explaining"), "| key | value |"))
-    # The command adds the name of the measure, and what is missing where nothing reaches the goal.
-    assert sorted(listed) == sorted([*explain(score_file(), 0).to_json(), "measure", "missing"])
+    cells, file = rows(page("explaining"), "| key | value |"), score_file()
+    found = explanation_in_words(file, explain(file, 0))
+    # The command adds what is missing where nothing reaches the goal.
+    assert sorted(names(cells)) == sorted([*found, "missing"])
+    for key in ("explained", "nearest_reaching"):
+        (text,) = (cell for name, cell in cells if name == f"`{key}`")
+        unknown = [inner for inner in found[key] if f"`{inner}`" not in text]
+        assert not unknown, f"docs/explaining.md, JSON, lacks {unknown} of `{key}`"
 
 
 def test_costs_of_changes():
