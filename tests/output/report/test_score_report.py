@@ -31,7 +31,7 @@ from tcs.output.report.score.tables import (
 from tcs.output.words import goals_text
 from tcs.placement.scoring import score
 from tcs.placement.store import StateTables, load_scores, save_scores
-from tcs.placement.tables import Reason
+from tcs.placement.tables import Reason, Window
 from tests.environments import write_environment
 from tests.output.report.test_page import Reader, column
 
@@ -133,6 +133,19 @@ def test_joints_and_stops_are_those_of_the_file(report):
     listed = ", ".join(column(table, "Serves goals")).split(", ")
     reached = [g for g, at in enumerate(report.assignment) if at is not None]
     assert sorted(listed) == sorted(f"{report.goal_names[g]} ({g + 1})" for g in reached)
+
+
+def test_stops_are_listed_with_their_windows_if_these_are_known(report):
+    assert "May be" not in {one.title for one in stops_table(report).columns}
+    choice, count = report.shown.choice, len(report.shown.members)
+    # In the order of the members, not of the tour.
+    windows: list[Window | None] = [None] * count
+    windows[choice.order[0]] = Window(0.04, 0.06, math.radians(5.0))
+    choice = dataclasses.replace(choice, windows=tuple(windows))
+    shown = dataclasses.replace(report.shown, choice=choice)
+    table = stops_table(dataclasses.replace(report, shown=shown))
+    expected = ["4 cm off in x, 6 cm in y, 5 degrees in heading"] + ["not known"] * (count - 1)
+    assert column(table, "May be") == expected
 
 
 def test_every_configuration_counts_once_for_each_goal(report):

@@ -24,7 +24,7 @@ from tcs.placement.refinement import score_members
 from tcs.placement.scoring import Job, rebuild_scenes, whole_task
 from tcs.placement.selection import Choice, nearest_table, select
 from tcs.placement.store import ScoreFile
-from tcs.placement.tables import RefinedSet, ScoreTable, SuccessTable
+from tcs.placement.tables import RefinedSet, ScoreTable, SuccessTable, Window
 
 
 class ScoredScene(NamedTuple):
@@ -180,6 +180,13 @@ class ShownSet:
     def places(self) -> list[str]:
         """Where each member is relative to the person, as a sentence; "" without a person."""
         return member_places(self.file, self.table, self.indices, self.members)
+
+    @property
+    def windows(self) -> tuple[Window | None, ...]:
+        """How far each member may be off, None where that is not known; () where it is of none."""
+        if self.choice is None or not any(self.choice.windows):
+            return ()
+        return tuple(self.choice.windows[i] for i in self.choice.order)
 
     @property
     def goal_names(self) -> tuple[str, ...]:

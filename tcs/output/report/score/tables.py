@@ -25,24 +25,29 @@ from tcs.output.words import (
 )
 from tcs.output.words.verification import check_lines
 from tcs.placement.reasons.distribution import CHECKS, checks_of
-from tcs.placement.tables import Reason
+from tcs.placement.tables import Reason, window_text
 
 
 def stops_table(report: ScoreReport) -> Table:
     """Return the configuration of each stop, in the order of the tour."""
     members = [member.to_json() for member in report.shown.members]
+    windows = report.shown.windows
+    off = ["not known" if one is None else window_text(one.to_json()) for one in windows]
     rows = [
         [
             str(number + 1),
             *(axis_value(key, value) for key, value in member.items()),
             goal_list(assigned_goals(report.assignment, number), report.goal_names) or "none",
+            *off[number : number + 1],
         ]
         for number, member in enumerate(members)
     ]
+    columns = [Column("Stop"), *(Column(axis_title(key)) for key in members[0])]
+    columns += [Column("Serves goals"), *([Column("May be", is_number=False)] if windows else [])]
     return Table(
         "The stops in the order of the tour. The base pose is given in the frame of the "
         f"environment: {report.job.spec.environment.origin}",
-        [Column("Stop"), *(Column(axis_title(key)) for key in members[0]), Column("Serves goals")],
+        columns,
         rows,
     )
 
