@@ -2,14 +2,16 @@
 
 Usage: python benchmarks/approach.py [--pairs 300] [--rounds 5] [--rows TASK/ENVIRONMENT ...]
 
-Processor times of scoring with and without approach are taken in turns on one thread. Reached pairs
-drawn at random are compared with a dense scan: postures at 96 values of the free joint, at 1,000 if
-none is approachable, at both ends of the line, followed by the straight motions of the planner.
-Drake re-checks approaches of the drawn pairs at postures at most a millimetre of motion apart.
+Goals are at their exact poses. Processor times of scoring with and without approach are taken in
+turns on one thread. Reached pairs drawn at random are compared with a dense scan: postures at 96
+values of the free joint, at 1,000 if none is approachable, at both ends of the line, followed by
+the straight motions of the planner. Drake re-checks approaches of the drawn pairs at postures at
+most a millimetre of motion apart.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 import time
 
@@ -17,12 +19,12 @@ import numpy as np
 from table import cell, header, parser, row, save
 
 import tcs
+from tcs.model.tasks import load_task
 from tcs.motion import Stop
 from tcs.motion.approach import SAMPLES, first_accesses
 from tcs.motion.approach_check import ApproachScene
 from tcs.placement.scoring import load_job, sweep, task_environment_pairs
 from tcs.placement.scoring.approaches import approach_lines
-from tcs.placement.scoring.rebuild import rebuild_scenes
 from tcs.placement.tables import Reason
 
 TIMED = ("shaving", "wheelchair")
@@ -46,17 +48,17 @@ def main() -> int:
     chosen = options.rows
     rows = task_environment_pairs() if chosen is None else [one.split("/") for one in chosen]
     for task, environment in rows:
-        file = tcs.score(task, environment, approach=True)
+        file = tcs.score(load_task(task).exact(), environment, approach=True)
         share(file)
         if (task, environment) in COMPARED:
-            compare(file, options.pairs, options.seed)
+            compare(task, environment, file, options)
     save(options)
     return 0
 
 
 def time_of(task: str, environment: str, rounds: int) -> None:
     """Measure the processor time of scoring with and without approach, in turns."""
-    job = load_job(task, environment, "pr2")
+    job = load_job(task, environment, "pr2", paper=True)
     lowered, lines = job.lowered(job.scene()), approach_lines(job)
     seconds: dict[bool, list[float]] = {False: [], True: []}
     for number in range(rounds + 1):
@@ -86,10 +88,12 @@ def share(file: tcs.ScoreFile) -> None:
     row(line, f"{sum(counts):,} reached, {counts[0]:,} approachable")
 
 
-def compare(file: tcs.ScoreFile, pairs: int, seed: int) -> None:
+def compare(task: str, environment: str, file: tcs.ScoreFile, options: argparse.Namespace) -> None:
     """Compare random pairs with the dense scan, and re-check their approaches with Drake."""
-    approaches = ApproachScene.of(*rebuild_scenes(file)[0])
-    job, scene = approaches.job, approaches.scene
+    pairs, seed = options.pairs, options.seed
+    job = load_job(task, environment, "pr2", paper=True)
+    scene = job.scene()
+    approaches = ApproachScene.of(job, scene, job.lowered(scene))
     scores = file.nominal.scores
     drawn = np.argwhere(scores.reached | np.isin(scores.reason, APPROACH))
     rng = np.random.default_rng(seed)

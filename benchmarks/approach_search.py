@@ -480,7 +480,7 @@ def refusals(robot: str, most: int, seed: int) -> None:
         most: Greatest number of refusals.
         seed: Seed of the draw.
     """
-    job = load_job(*TASK, robot)
+    job = load_job(*TASK, robot, paper=True)
     scene, lines = job.scene(), approach_lines(job)
     lowered = job.lowered(scene)
     (table,) = sweep(lowered, job.task.weights, jobs=1, approaches=lines).tables

@@ -53,8 +53,7 @@ def main() -> None:
             if environment == "bed":
                 nominal = at_nominal_position(environment, Path(folder))
             files = [
-                tcs.score(task, nominal, robot, jobs=options.jobs, approach=False)
-                for robot in ROBOTS
+                tcs.score(task, nominal, robot, jobs=options.jobs, paper=True) for robot in ROBOTS
             ]
             rows.append([f"{task}, {environment}", *compared(*files)])
             print(" | ".join(rows[-1]), flush=True)

@@ -349,9 +349,7 @@ def tcs_choice(
         task = {**named, "environments": ["grasp"], "tool": "the robot's own", "goals": [goal]}
         (folder / "grasp.yaml").write_text(yaml.safe_dump(task), encoding="utf-8")
         begun = time.process_time()
-        file = score(
-            folder / "grasp.yaml", folder / "table.yaml", ROBOT, max_members=1, approach=False
-        )
+        file = score(folder / "grasp.yaml", folder / "table.yaml", ROBOT, max_members=1, paper=True)
         file = robustify(file, errors={"object_x": normal, "object_y": normal})
         seconds = time.process_time() - begun
     success = file.tables[0].success

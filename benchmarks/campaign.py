@@ -111,7 +111,7 @@ def estimates(group: Sequence[Job], people: People) -> list[dict[str, Any]]:
     """Return what scoring each job of a row and robot would take, or why it is refused."""
     task, environment = load_task(group[0].task), load_environment(group[0].environment)
     robot = load_robot(group[0].robot)
-    job = load_job(task, environment, robot)
+    job = load_job(task, environment, robot, paper=True)
     scene = job.scene()
     lowered = job.lowered(scene)
     states = list(job.scored_grid.environment_states())
@@ -165,7 +165,7 @@ def ran(job: Job, folder: Path, until: str | None) -> dict[str, Any] | None:
                 person=job.person,
                 jobs=1,
                 on_progress=lambda done, _: times.append((done, time.process_time())),
-                approach=False,
+                paper=True,
             )
         except tcs.TcsError as error:
             return _kept(path, {"error": str(error)})

@@ -86,7 +86,7 @@ def strata(
     robot: str, options: argparse.Namespace
 ) -> Iterator[tuple[str, str, Iterator[Constructed | None]]]:
     """Return group, name and goals of the strata of one robot."""
-    job = load_job("shaving", "wheelchair", robot)
+    job = load_job("shaving", "wheelchair", robot, paper=True)
     lowered = job.lowered(job.scene())
     scene, grid = lowered.arrays, lowered.grid
     for name, joint in JOINTS.items():

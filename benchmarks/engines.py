@@ -44,7 +44,7 @@ def main() -> None:
                     options.environment,
                     jobs=options.jobs,
                     engine=engine,
-                    approach=False,
+                    paper=True,
                 )
                 digests.add(digest(file))
                 if number:

@@ -45,8 +45,8 @@ def main() -> None:
         path = options.scores / default_path(task, environment, ROBOT)
         if not path.exists():
             path.parent.mkdir(parents=True, exist_ok=True)
-            tcs.save(path, tcs.score(task, environment, ROBOT, jobs=options.jobs, approach=False))
-        trials = Trials.of(tcs.load(path), body_collisions="paper")
+            tcs.save(path, tcs.score(task, environment, ROBOT, jobs=options.jobs, paper=True))
+        trials = Trials.of(tcs.load(path))
         sampling = {"samples": options.samples, "seed": options.seed, "jobs": options.jobs}
         for members in (1, 2):
             near, equal = (

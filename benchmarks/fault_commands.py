@@ -114,7 +114,7 @@ def small_scores(folder: Path) -> tuple[Path, Path]:
     make = (
         "score",
         "shaving",
-        "--no-approach",
+        "--paper",
         "--environment",
         str(environment),
         "--out",
@@ -132,7 +132,7 @@ def scoring_commands(environment: Path, scores: Path) -> tuple[Command, ...]:
         environment: A small environment.
         scores: Its scores.
     """
-    make = ("score", "shaving", "--no-approach", "--environment", str(environment))
+    make = ("score", "shaving", "--paper", "--environment", str(environment))
     samples = ("--samples", "64")
     people = ("--bodies", "6", "--sets", "2", "--map", "{out}")
     return (

@@ -211,7 +211,7 @@ def kernel_flips(folder: Path, tries: int, rng: random.Random) -> Counter[str]:
     def scored(before: str = "") -> tuple[object, list[str]] | str:
         path = folder / "scores.tcs"
         program = f"{before}\nfrom tcs.cli import main\nmain()"
-        words = ("score", "shaving", "--environment", environment, "--no-approach")
+        words = ("score", "shaving", "--environment", environment, "--paper")
         words += ("--out", path, "--json")
         done = subprocess.run(
             [sys.executable, "-c", program, *map(str, words)],

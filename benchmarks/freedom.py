@@ -184,7 +184,7 @@ def approachable(task: str, environment: str, robot: str, options: argparse.Name
 
 def free_task(freedom: Freedom) -> Task:
     """Return the task with a freedom at every goal."""
-    task = load_task(TASK)
+    task = load_task(TASK).exact()
     return replace(task, goals=tuple(replace(goal, free=freedom) for goal in task.goals))
 
 

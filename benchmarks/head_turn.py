@@ -32,7 +32,7 @@ def main() -> None:
     gain, best = [], []
     for task in TASKS:
         for name, environment in (("straight", STRAIGHT), ("turned", TURNING)):
-            file = tcs.score(task, environment, "pr2", jobs=options.jobs, approach=False)
+            file = tcs.score(task, environment, "pr2", jobs=options.jobs, paper=True)
             gain.append([task, name, *cells(file.nominal.scores, file.nominal.sets)])
             row(f"{task}, {name}", "  ".join(gain[-1][2:]))
         sets = file.nominal.sets

@@ -49,7 +49,7 @@ def main() -> None:
 def times(task: str, repeats: int) -> None:
     """Measure wall and processor time of one observation."""
     begun = time.perf_counter()
-    scorer = LiveScorer(task, approach=False)
+    scorer = LiveScorer(task, paper=True)
     row(f"{task}: scene and machine code", f"{time.perf_counter() - begun:.2f} s, once")
     rng = np.random.default_rng(0)
     first = []
@@ -84,8 +84,8 @@ def times(task: str, repeats: int) -> None:
 
 def gains(task: str, environment: str, between: float) -> None:
     """Print the gain of the best set scored live over that of the nearest stored shift."""
-    stored = score(task, environment, approach=False)
-    scorer = LiveScorer(task, environment, approach=False)
+    stored = score(task, environment, paper=True)
+    scorer = LiveScorer(task, environment, paper=True)
     steps = stored.observed_axes[0].values
     places = [float(y) + between for y in steps[:-1]]
     differences = []

@@ -37,7 +37,7 @@ def main() -> int:
     options = command_line.parse_args()
     header()
     for robot, task in (name.split(":") for name in options.rows.split(",")):
-        job = load_job(task, ENVIRONMENT, robot)
+        job = load_job(task, ENVIRONMENT, robot, paper=True)
         lowered = job.lowered(job.scene())
         problem = build_problem(lowered.arrays)
         numeric = problem._replace(arm=outside_solver(lowered.arrays.chain))

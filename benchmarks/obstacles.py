@@ -130,9 +130,7 @@ def scored(
     tasks: Sequence[str | Task], only: Sequence[str] = (), environment: str | Path = "wheelchair"
 ) -> list[tcs.ScoreFile]:
     """Return the score file of each task."""
-    return [
-        tcs.score(task, environment, "pr2", jobs=1, only=only, approach=False) for task in tasks
-    ]
+    return [tcs.score(task, environment, "pr2", jobs=1, only=only, paper=True) for task in tasks]
 
 
 def in_turn(rounds: int, *scorings: Callable[[], list[tcs.ScoreFile]]) -> list[Runs]:

@@ -126,7 +126,7 @@ def path_of(folder: Path, name: str, what: str) -> Path:
 
 def warm_up() -> None:
     """Load what a process needs at its first call, and which is not measured."""
-    tcs.score("feeding", "wheelchair", "pr2", jobs=1, approach=False)
+    tcs.score("feeding", "wheelchair", "pr2", jobs=1, paper=True)
 
 
 def scored_row(folder: Path, options: argparse.Namespace, name: str) -> float:
@@ -136,7 +136,7 @@ def scored_row(folder: Path, options: argparse.Namespace, name: str) -> float:
     if environment.startswith("bed"):
         nominal = at_nominal_position(environment, folder)
     begun = time.process_time()
-    file = tcs.score(task, nominal, "pr2", measure=options.measure, jobs=1, approach=False)
+    file = tcs.score(task, nominal, "pr2", measure=options.measure, jobs=1, paper=True)
     spent = time.process_time() - begun
     tcs.save(path_of(folder, name, "scored"), file)
     return spent

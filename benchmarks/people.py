@@ -73,7 +73,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             path = on_small_grid(Path(folder), environment)
             person = {"sex": body.sex, **body.measures, **angles}
-            file = tcs.score(task, path, person=person, jobs=options.jobs, approach=False)
+            file = tcs.score(task, path, person=person, jobs=options.jobs, paper=True)
             found = tcs.verify(file, pairs=options.pairs, dense=0, jobs=options.jobs)
         counts[row_of] += (1, found.checked, found.false_reached)
         row(

@@ -121,7 +121,7 @@ class Bench:
 
     def __init__(self) -> None:
         """Lower the robot in a scene of one configuration."""
-        job = load_job("feeding", "wheelchair", robot_of_problems())
+        job = load_job("feeding", "wheelchair", robot_of_problems(), paper=True)
         self.robot = job.spec.robot
         self.lowered: LoweredScene = job.lowered(job.scene())
         self.trees: Trees = new_trees(0)

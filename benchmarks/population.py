@@ -63,7 +63,7 @@ def scored(task: str, environment: str, options: argparse.Namespace) -> tcs.Scor
     """Return the score file of a row, written if it is missing."""
     path = options.scores / default_path(task, environment, ROBOT)
     if not path.exists():
-        tcs.save(path, tcs.score(task, environment, ROBOT, jobs=options.jobs, approach=False))
+        tcs.save(path, tcs.score(task, environment, ROBOT, jobs=options.jobs, paper=True))
     return tcs.load(path)
 
 

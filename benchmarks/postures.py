@@ -87,7 +87,7 @@ def scored(
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "chosen.yaml"
         path.write_text(yaml.safe_dump(content), encoding="utf-8")
-        return tcs.score(task, path, "pr2", jobs=jobs, approach=False)
+        return tcs.score(task, path, "pr2", jobs=jobs, paper=True)
 
 
 def posed_for_each_goal(
@@ -122,7 +122,7 @@ def posed_for_each_goal(
 def served_cells(posture: str | None, options: argparse.Namespace) -> list[str]:
     """Return whom the best set of bathing in bed serves, of people in a posture."""
     person = None if posture is None else {"posture": posture}
-    file = tcs.score("bathing", "bed", "pr2", person=person, jobs=options.jobs, approach=False)
+    file = tcs.score("bathing", "bed", "pr2", person=person, jobs=options.jobs, paper=True)
     people = draw_bodies(options.bodies, seed=options.seed)
     found = tcs.population(file, people, top=tcs.Top(count=1), jobs=options.jobs).to_json()
     low, high = found["ci95"]

@@ -73,14 +73,8 @@ def best_under_error(
     task: str, environment: Path, only: tuple[str, ...], options: argparse.Namespace
 ) -> Evaluation:
     """Return the evaluation of the best set of a task on a grid."""
-    file = tcs.score(task, environment, "pr2", only=only, jobs=options.jobs, approach=False)
-    return evaluate(
-        file,
-        samples=options.samples,
-        seed=options.seed,
-        jobs=options.jobs,
-        body_collisions="paper",
-    )
+    file = tcs.score(task, environment, "pr2", only=only, jobs=options.jobs, paper=True)
+    return evaluate(file, samples=options.samples, seed=options.seed, jobs=options.jobs)
 
 
 if __name__ == "__main__":

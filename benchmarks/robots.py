@@ -91,7 +91,7 @@ def times(works: Sequence[Work], repeats: int, jobs: int) -> None:
     """Measure the scoring of every task with every robot, and print the reasons."""
     lowered = {}
     for work in works:
-        job = load_job(work.task, work.environment, work.robot)
+        job = load_job(work.task, work.environment, work.robot, paper=True)
         lowered[work] = job.lowered(job.scene()), job.task.weights, job.tables
     taken: dict[Work, list[float]] = {work: [] for work in works}
     scores = {}
@@ -110,7 +110,7 @@ def times(works: Sequence[Work], repeats: int, jobs: int) -> None:
 
 def finding(work: Work, options: argparse.Namespace) -> dict[str, Any]:
     """Score one task and re-check it, unless an earlier run has; return what was found."""
-    job = load_job(work.task, work.environment, work.robot)
+    job = load_job(work.task, work.environment, work.robot, paper=True)
     key = {
         **dataclasses.asdict(work),
         "scene": job.lowered(job.scene()).digest(),
@@ -121,7 +121,7 @@ def finding(work: Work, options: argparse.Namespace) -> dict[str, Any]:
         if line["key"] == key:
             row(f"verify {work.line}", f"{line['text']} (measured before)")
             return dict(line["found"])
-    file = score(work.task, work.environment, work.robot, jobs=options.jobs, approach=False)
+    file = score(work.task, work.environment, work.robot, jobs=options.jobs, paper=True)
     verification = verify(
         file,
         pairs=options.pairs,

@@ -84,7 +84,7 @@ def estimated(task: str, environment: str, folder: Path, options: argparse.Names
     """Return the path of a copy of a score file with estimates of success."""
     path = options.scores / default_path(task, environment, ROBOT)
     if not path.exists():
-        tcs.save(path, tcs.score(task, environment, ROBOT, jobs=options.jobs, approach=False))
+        tcs.save(path, tcs.score(task, environment, ROBOT, jobs=options.jobs, paper=True))
     file = tcs.load(path)
     check_row(path, file, task, environment, ROBOT)
     begun = time.perf_counter()

@@ -54,7 +54,7 @@ def main() -> None:
                 nominal = at_nominal_position(environment, Path(folder))
             for measure in MEASURES:
                 file = tcs.score(
-                    task, nominal, "pr2", measure=measure, jobs=options.jobs, approach=False
+                    task, nominal, "pr2", measure=measure, jobs=options.jobs, paper=True
                 )
                 found = evaluate(
                     file,

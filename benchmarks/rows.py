@@ -53,7 +53,7 @@ def measured(name: str, text: str) -> None:
 
 def bathing(repeats: int) -> None:
     """Measure the scoring of bathing on the bed, all shifts of the person, on two threads."""
-    job = load_job("bathing", "bed", "pr2")
+    job = load_job("bathing", "bed", "pr2", paper=True)
     lowered = job.lowered(job.scene())
     swept = [sweep(lowered, job.task.weights, tables=job.tables) for _ in range(repeats)]
     measured("bathing, bed: scoring_seconds", spread([s.scoring_seconds for s in swept]))
@@ -61,7 +61,7 @@ def bathing(repeats: int) -> None:
 
 def whole_process(folder: Path) -> list[dict[str, object]]:
     """Measure `tcs score --all` as one process, and print its rows."""
-    words = ["score", "--all", "--no-approach", "--out", str(folder), "--json"]
+    words = ["score", "--all", "--paper", "--out", str(folder), "--json"]
     command = [sys.executable, "-m", "tcs", *words]
     begun = time.perf_counter()
     done = subprocess.run(command, check=True, capture_output=True, text=True)

@@ -40,7 +40,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scores.tcs"
         lowered_times(options)
-        file = score(options.task, approach=False)
+        file = score(options.task, paper=True)
         save_scores(path, file)
         store_times(path, options.repeats)
         select_times(path, options.seed)
@@ -70,7 +70,7 @@ def parse() -> argparse.Namespace:
 def lowered_times(options: argparse.Namespace) -> None:
     """Measure scoring and set building, and compare the kernel with the plain-loop reference."""
     begun = time.perf_counter()
-    job = load_job(options.task, "wheelchair", "pr2")
+    job = load_job(options.task, "wheelchair", "pr2", paper=True)
     lowered = job.lowered(job.scene())
     row("scene built and lowered", f"{time.perf_counter() - begun:.3f} s")
     loading = warm_up(build_problem(lowered.arrays))
@@ -132,7 +132,7 @@ def select_times(path: Path, seed: int) -> None:
 
 def process_times(task: str, path: Path, repeats: int) -> None:
     """Measure `tcs score` as a whole process, with machine code ready."""
-    words = ["score", task, "--environment", "wheelchair", "--no-approach"]
+    words = ["score", task, "--environment", "wheelchair", "--paper"]
     command = [sys.executable, "-m", "tcs", *words]
     taken = []
     for _ in range(repeats):

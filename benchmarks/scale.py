@@ -118,7 +118,7 @@ def measured(folder: Path, grid: str, jobs: int, first: float) -> tuple[str, flo
         first: Scoring time of a configuration of the first grid [s]; 0 for that one.
     """
     words = ["score", "shaving", "--environment", str(environment(folder, grid))]
-    words += ["--no-approach", "--jobs", str(jobs), "--blocks", "blocks", "--out", "fine.tcs"]
+    words += ["--paper", "--jobs", str(jobs), "--blocks", "blocks", "--out", "fine.tcs"]
     scored = run(words, folder)
     again = run(words, folder)
     size = scored.result["configurations"]

@@ -152,7 +152,7 @@ def main() -> None:
     rows = []
     print(" | ".join(COLUMNS))
     for name in options.rows:
-        file = tcs.score(*name.split("/"), "pr2", jobs=1, approach=False)
+        file = tcs.score(*name.split("/"), "pr2", jobs=1, paper=True)
         for checks in options.checks:
             rows.append(measured(name, file, checks, options))
             print(" | ".join(rows[-1]), flush=True)

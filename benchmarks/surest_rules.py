@@ -157,19 +157,17 @@ def measured(name: str, rules: Rules, folder: Path, options: argparse.Namespace)
     text = GRID.format(rules.torso_step)
     place = written(folder / "environment.yaml", environment, text + rules.environment)
     robot = written(folder / "robot.yaml", "pr2", rules.robot)
-    file = tcs.score(task, place, robot, max_members=rules.members, jobs=1, approach=False)
+    file = tcs.score(task, place, robot, max_members=rules.members, jobs=1, paper=True)
     trials = Trials.of(file, body_collisions=rules.body_collisions)
     of = PerturbedPoints if rules.arm_collides else WithinReach
     if rules.is_refined:
-        values = first_set(tcs.refine(file, body_collisions="paper", jobs=1, **REFINED))
+        values = first_set(tcs.refine(file, jobs=1, **REFINED))
     else:
         values = surest(of(trials, trials.errors.draw(options.searched, 0, stream=STREAM), 1))
     found = judged(of(trials, trials.errors.draw(options.samples, FIRST_SAMPLE), 1), values)
     by_tcs = found
     if rules.body_collisions != "paper" or rules.environment or rules.robot:
-        plain = Trials.of(
-            tcs.score(task, environment, "pr2", jobs=1, approach=False), body_collisions="paper"
-        )
+        plain = Trials.of(tcs.score(task, environment, "pr2", jobs=1, paper=True))
         drawn = PerturbedPoints(plain, plain.errors.draw(options.samples, FIRST_SAMPLE), 1)
         by_tcs = judged(drawn, values)
     published = load_paper().published(task, environment)

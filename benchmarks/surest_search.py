@@ -76,11 +76,11 @@ def main() -> None:
     rows = []
     for name in options.rows:
         task, environment = name.split("/")
-        file = tcs.score(task, environment, "pr2", jobs=1, approach=False)
-        robust = tcs.robustify(file, sets=400, samples=256, body_collisions="paper", jobs=1)
-        refined = first_set(tcs.refine(robust, body_collisions="paper", jobs=1, **SUREST))
+        file = tcs.score(task, environment, "pr2", jobs=1, paper=True)
+        robust = tcs.robustify(file, sets=400, samples=256, jobs=1)
+        refined = first_set(tcs.refine(robust, jobs=1, **SUREST))
         anew = from_random(file, options.drawn, options.seed)
-        trials = Trials.of(file, body_collisions="paper")
+        trials = Trials.of(file)
         offsets = trials.errors.draw(options.samples, FIRST_SAMPLE)
         judge = PerturbedPoints(trials, offsets, 1)
         found = [judged(judge, trials.weights, values) for values in (refined, anew.values)]
@@ -105,7 +105,7 @@ def from_random(file: tcs.ScoreFile, drawn: int, seed: int) -> FromRandom:
     """Return the surest set that the search finds from drawn configurations."""
     scorer = PointScorer.of(file, file.nominal_index, 1)
     space = Space.of(file.configurations, file.nominal.sets)
-    trials = Trials.of(file, body_collisions="paper")
+    trials = Trials.of(file)
     searching, choosing = (
         PerturbedPoints(trials, trials.errors.draw(SAMPLES, seed, stream=name), 1)
         for name in ("search", "choice")

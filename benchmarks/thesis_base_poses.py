@@ -119,7 +119,7 @@ def tcs_choices(task: GraspTask, jobs: int) -> dict[str, BasePose]:
     normal = ErrorDistribution(distribution="normal", std=0.025)
     with tempfile.TemporaryDirectory() as name:
         paths = written(task, Path(name))
-        file = score(*paths, max_members=1, jobs=jobs, approach=False)
+        file = score(*paths, max_members=1, jobs=jobs, paper=True)
         file = robustify(file, errors={"object_x": normal, "object_y": normal}, jobs=jobs)
     grid, success = Grid.from_dict(file.grid), file.nominal.success
     (best,) = file.nominal.sets.best

@@ -114,15 +114,15 @@ def judged(folder: Path, options: argparse.Namespace, name: str) -> list[tuple[f
     """Return the mean of the goals reached, and the rooms with all of them, for each set."""
     task, environment = name.split("/")
     at = environment_file(folder, environment, options)
-    file = tcs.score(task, at, "pr2", measure=MEASURE, jobs=1, approach=False)
-    robust = tcs.robustify(file, sets=400, samples=256, body_collisions="paper", jobs=1)
+    file = tcs.score(task, at, "pr2", measure=MEASURE, jobs=1, paper=True)
+    robust = tcs.robustify(file, sets=400, samples=256, jobs=1)
     run = cma_run(file, 0.0, options.seed, toc=True, whole=True)
     sets = [
         on_grid(file, file.nominal.sets.best),
         run.members,
-        first_set(tcs.refine(robust, body_collisions="paper", jobs=1, **SUREST)),
+        first_set(tcs.refine(robust, jobs=1, **SUREST)),
     ]
-    trials = Trials.of(file, body_collisions="paper")
+    trials = Trials.of(file)
     samples = PerturbedPoints(trials, trials.errors.draw(options.samples, 0), 1)
     return [success(samples, trials.weights, values) for values in sets]
 

@@ -58,7 +58,7 @@ def score_file(job: tuple[str, str, str], folder: Path) -> Path:
     """Return the path of a score file; a missing one is scored first."""
     path = folder / default_path(*job)
     if not path.exists():
-        tcs.save(path, tcs.score(*job, approach=False))
+        tcs.save(path, tcs.score(*job, paper=True))
     return path
 
 

@@ -136,7 +136,7 @@ def score_file(row: tuple[str, str], options: argparse.Namespace) -> ScoreFile:
             scored = tcs.score(
                 *row,
                 ROBOT,
-                approach=False,
+                paper=True,
                 jobs=options.jobs,
                 on_progress=on_progress,
                 on_compile=terminal.note_compiling,

@@ -90,7 +90,7 @@ def score(path: Path, row: tuple[str, str], jobs: int) -> None:
         file = tcs.score(
             *row,
             ROBOT,
-            approach=False,
+            paper=True,
             jobs=jobs,
             on_progress=on_progress,
             on_compile=terminal.note_compiling,

@@ -4,10 +4,11 @@ Usage: python scripts/scores_identity.py CHECKOUT [--rows TASK:ENVIRONMENT ...] 
            [--kept FOLDER]
 
 CHECKOUT is a folder with the other commit, as `git worktree add --detach CHECKOUT COMMIT` makes it.
-Each side scores in a process of its own, with its own models and tasks, without approach. Printed
-is one line for each row and robot: `equal` with the digest of reasons, pairs of bodies, dexterity
-and joints, or for each of these how many values differ and by how much at most. Returns 1 if any
-differ. The scores of the other side are kept in --kept, if given, for the next comparison.
+Each side scores in a process of its own, with its own models and tasks, as in the papers: exact
+poses, without approach. Printed is one line for each row and robot: `equal` with the digest of
+reasons, pairs of bodies, dexterity and joints, or for each of these how many values differ and by
+how much at most. Returns 1 if any differ. The scores of the other side are kept in --kept, if
+given, for the next comparison.
 
 Robots whose shapes or rules were changed on purpose since differ from old commits rightly: since
 a24563ca a configuration counts only if the arm at rest is free, and shapes were mended.
@@ -37,9 +38,12 @@ import sys
 import numpy as np
 import tcs
 from tcs.placement.scoring import load_job, sweep
+from tcs.placement.scoring.job import JobOptions
 
 task, environment, robot, out = sys.argv[1:]
-job = load_job(task, environment, robot)
+# Commits without this option scored exact poses only.
+options = {"paper": True} if "paper" in JobOptions.__annotations__ else {}
+job = load_job(task, environment, robot, **options)
 (table,) = sweep(job.lowered(job.scene()), job.task.weights).tables
 np.savez(
     out,

@@ -14,7 +14,7 @@ from joblib import Parallel, delayed
 from tcs.errors import StoreMismatchError
 from tcs.placement.robustness.evaluation import Evaluation, evaluate
 from tcs.placement.robustness.trials import Trials
-from tcs.placement.store import APPROACH, ScoreFile, load_scores
+from tcs.placement.store import PAPER, ScoreFile, load_scores
 from tcs_studies.robustness.comparison import MethodComparison, compare_methods
 from tcs_studies.robustness.gains import Gain, Prediction, predictions, robust_gains
 from tcs_studies.robustness.losses import Losses, losses
@@ -91,12 +91,12 @@ def check_row(path: Path, file: ScoreFile, task: str, environment: str, robot: s
         robot: Name of the expected robot.
 
     Raises:
-        StoreMismatchError: If task, environment or robot differ, or it was scored with approach,
-            which the paper does not know.
+        StoreMismatchError: If task, environment or robot differ, or it was not scored as in the
+            papers.
     """
-    if APPROACH in file.metadata:
+    if PAPER not in file.metadata:
         raise StoreMismatchError(
-            f"Score file '{path}' was scored with approach, and the paper's rows are not. Give "
+            f"Score file '{path}' was not scored as the paper scores its rows (--paper). Give "
             "another folder of score files, or remove this file to have the row scored."
         )
     expected = {"task": task, "environment": environment, "robot": robot}
