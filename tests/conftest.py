@@ -139,8 +139,8 @@ def full_grid(wheelchair):
 
 @pytest.fixture(scope="session")
 def shaving():
-    """The shaving task."""
-    return load_task("shaving")
+    """The shaving task at exact poses."""
+    return load_task("shaving").exact()
 
 
 @pytest.fixture(scope="session")

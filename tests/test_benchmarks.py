@@ -37,7 +37,7 @@ def module(monkeypatch):
 
 @pytest.fixture(scope="module")
 def chain():
-    job = load_job("shaving", "wheelchair", "pr2")
+    job = load_job("shaving", "wheelchair", "pr2", paper=True)
     return job.lowered(job.scene()).arrays.chain
 
 

@@ -60,9 +60,7 @@ def url(tmp_path_factory):
     folder = tmp_path_factory.mktemp("app")
     grid = {**BESIDE, "base_yaw": (0, 45, 8)}
     environment = write_environment(folder, "beside", grid)
-    tcs.save(
-        folder / "beside.tcs", tcs.score("shaving", environment=str(environment), approach=False)
-    )
+    tcs.save(folder / "beside.tcs", tcs.score("shaving", environment=str(environment), paper=True))
     with Engine() as engine:
         engine.open_file(folder / "beside.tcs")
         application = make_application(engine, Access())
@@ -248,7 +246,7 @@ def test_undo_shows_the_state_that_its_sliders_say(browser, tmp_path):
     environment = write_environment(tmp_path, "beds", grid, based_on="bed")
     script = browser.driver.execute_script
     with Engine() as engine:
-        scores = tcs.score("shaving", environment=str(environment), approach=False)
+        scores = tcs.score("shaving", environment=str(environment), paper=True)
         tcs.save(tmp_path / "beds.tcs", scores)
         engine.open_file(tmp_path / "beds.tcs")
         application = make_application(engine, Access())

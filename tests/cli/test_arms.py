@@ -14,7 +14,7 @@ def both(tcs_command, corner, folder):
     if not path.exists():
         ran = tcs_command(
             *("score", "shaving", "--environment", corner, "--robot", "pr2", "--arms", "both"),
-            *("--out", path, "--no-approach", "--json"),
+            *("--out", path, "--paper", "--json"),
         )
         assert ran.code == 0
         assert ran.json["configurations"] == 36

@@ -22,7 +22,7 @@ def stored(tmp_path_factory):
     environment = folder / "beside.yaml"
     environment.write_text(BESIDE)
     path = folder / "beside.tcs"
-    tcs.save(path, tcs.score("shaving", environment, approach=False))
+    tcs.save(path, tcs.score("shaving", environment, paper=True))
     return path
 
 

@@ -9,7 +9,7 @@ import tcs
 
 def test_sets_are_counted_for_people(tcs_command, corner, tmp_path):
     file, picture, people = (tmp_path / name for name in ("a.tcs", "map.png", "people.csv"))
-    tcs.save(file, tcs.score("shaving", corner, approach=False))
+    tcs.save(file, tcs.score("shaving", corner, paper=True))
     people.write_text("sex,stature_percentile\nfemale,5\nmale,95\n")
     found = tcs_command(
         *("population", file, "--people", people, "--sets", 2, "--min-apart", 0.1),

@@ -12,7 +12,7 @@ def test_json_and_text(tcs_command, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("tcs.placement.refinement.refined_file.FRESH_SAMPLES", 20)
     environment, path, out = (tmp_path / name for name in ("beside.yaml", "a.tcs", "b.tcs"))
     environment.write_text(BESIDE)
-    tcs.save(path, tcs.score("shaving", environment, approach=False))
+    tcs.save(path, tcs.score("shaving", environment, paper=True))
     words = ("refine", path, "--out", out, "--starts", 1, "--rounds", 1, "--json")
     ran = tcs_command(*words, "--body-collisions", "none")
     assert (ran.code, ran.err) == (0, "")

@@ -11,6 +11,7 @@ import yaml
 
 from tcs.files.paths import data_folder
 from tests.environments import write_environment
+from tests.exact import exact_content
 from tests.two_arms import GRID as BETWEEN
 from tests.two_arms import PAIR
 
@@ -58,6 +59,11 @@ def exact(goals: Goals) -> Goals:
     return goals
 
 
+def as_meant(goals: Goals) -> Goals:
+    """Leave free what the shipped task does."""
+    return goals
+
+
 def free(region: Mapping[str, Any]) -> Callable[[Goals], Goals]:
     """Return the change that leaves something of each goal free."""
     return lambda goals: [{**goal, "free": dict(region)} for goal in goals]
@@ -102,7 +108,9 @@ class Kind:
 
     def make(self, folder: Path, run: Run) -> Path:
         """Score a file of this kind in a folder, and return its path."""
-        task = yaml.safe_load((data_folder() / "tasks" / "adl" / "shaving.yaml").read_text())
+        shaving = data_folder() / "tasks" / "adl" / "shaving.yaml"
+        meant = self.change is as_meant
+        task = yaml.safe_load(shaving.read_text()) if meant else exact_content("shaving")
         chosen = self.seed_goals or [task["goals"][goal] for goal in self.arm.goals]
         task |= {"name": "some", "goals": self.change(chosen)}
         path = folder / "some.yaml"
@@ -172,6 +180,8 @@ KINDS: dict[str, Kind] = {
     "six joints, elimination": Kind(ELIMINATION),
     "five joints": OnTheTable(SIX),
     "slides (Stretch)": Kind(STRETCH),
+    "as meant": Kind(CLOSED, as_meant),
+    "as in the papers": Kind(CLOSED, as_meant, ("--paper",)),
     "free rotation": Kind(CLOSED, free(ROTATION)),
     "free cone": Kind(CLOSED, free(CONE)),
     "free rotation, traced": Kind(TRACED, free(ROTATION)),

@@ -22,7 +22,7 @@ LONG = "refinement", "selection"
 def scored(tmp_path_factory):
     """A score file: any will do, so one that is made in a second."""
     path = tmp_path_factory.mktemp("scored") / "feeding.tcs"
-    tcs.save(path, tcs.score("feeding", approach=False))
+    tcs.save(path, tcs.score("feeding", paper=True))
     return path
 
 

@@ -122,7 +122,7 @@ def test_parts_of_a_report(tmp_path):
     path = tmp_path / "bed.tcs"
     tcs.save(
         path,
-        tcs.score("scratching_chest", DOCS.parent / "examples" / "small_bed.yaml", approach=False),
+        tcs.score("scratching_chest", DOCS.parent / "examples" / "small_bed.yaml", paper=True),
     )
     report = make_score_page(
         make_score_report(path, sizes=CheckSizes(pairs=1, dense=0)), command="tcs report"

@@ -36,7 +36,7 @@ AWAY = some_of([0.1, 0.06, 0.01, 0.003, 1e-3], 1e-3)
 @pytest.fixture(scope="module", params=some_of(ROBOTS, "tiago", "iiwa7"))
 def scene(request):
     """Arrays of shaving in the wheelchair with one robot."""
-    job = load_job("shaving", "wheelchair", request.param)
+    job = load_job("shaving", "wheelchair", request.param, paper=True)
     lowered = job.lowered(job.scene())
     return lowered.arrays, lowered.grid
 
@@ -93,7 +93,7 @@ def test_goals_in_windows_between_limits_are_reached(scene, width):
 
 
 def test_the_stretched_arm_is_not_too_far():
-    job = load_job("shaving", "wheelchair", "iiwa7")
+    job = load_job("shaving", "wheelchair", "iiwa7", paper=True)
     lowered = job.lowered(job.scene())
     rng = np.random.default_rng(0)
     made = near_singular_goals(rng, lowered.arrays, lowered.grid, ELBOW, 0.0, 40)

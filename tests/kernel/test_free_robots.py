@@ -36,7 +36,7 @@ WIDER = {
 @functools.cache
 def free_problem(robot, free):
     """Return *shaving* in the wheelchair with a freedom at every goal, and its grid."""
-    task = load_task("shaving")
+    task = load_task("shaving").exact()
     task = replace(task, goals=tuple(replace(goal, free=free) for goal in task.goals))
     job = load_job(task, "wheelchair", robot)
     lowered = job.lowered(job.scene())

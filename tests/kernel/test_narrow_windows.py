@@ -30,7 +30,7 @@ STRETCHED = [(24248, 5)]
 
 
 def problem_of(task, environment, robot="pr2"):
-    job = load_job(task, environment, robot)
+    job = load_job(task, environment, robot, paper=True)
     lowered = job.lowered(job.scene())
     return build_problem(lowered.arrays), lowered.grid
 
@@ -71,7 +71,7 @@ def test_a_window_narrower_than_the_dense_scan_is_found(shaving_with_tiago, h, g
     scores = scores_of(problem, rows_at(grid, [h]))
     assert scores.reason[0, g] == REACHED
     # The dense scan may step over it; the reference judges the solution itself.
-    job = load_job("shaving", "wheelchair", "tiago")
+    job = load_job("shaving", "wheelchair", "tiago", paper=True)
     lowered = job.lowered(job.scene())
     assert is_true(lowered.arrays, lowered.grid, h, g, scores.joints[0, g])
 

@@ -80,7 +80,7 @@ def test_numeric_ik_reaches_what_the_closed_form_reaches_in_the_real_scene(lower
 
 
 def test_goals_at_the_edge_of_the_workspace_are_reached():
-    job = load_job("scratching_thigh_left", "bed", "baxter")
+    job = load_job("scratching_thigh_left", "bed", "baxter", paper=True)
     lowered = job.lowered(job.scene())
     grid = lowered.grid
     axes = grid.base_x, grid.base_y, grid.base_yaw

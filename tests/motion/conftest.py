@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 import tcs
 from tcs.cli.app import app
-from tcs.files.paths import data_folder
+from tests.exact import exact_content
 
 CONFIGURATION = ("base_x = 0.6 m", "base_y = -0.9 m", "base_yaw = 45 deg", "torso = 0.3 m")
 
@@ -17,7 +17,7 @@ CONFIGURATION = ("base_x = 0.6 m", "base_y = -0.9 m", "base_yaw = 45 deg", "tors
 def two_goals(tmp_path_factory):
     """Path of a score file with goals 5 and 6 of shaving at one configuration."""
     folder = tmp_path_factory.mktemp("motion")
-    task = yaml.safe_load((data_folder() / "tasks" / "adl" / "shaving.yaml").read_text())
+    task = exact_content("shaving")
     task["goals"] = [task["goals"][5], task["goals"][6]]
     path = folder / "shaving.yaml"
     path.write_text(yaml.safe_dump(task))

@@ -19,7 +19,7 @@ NONE = {"person_x": ErrorDistribution(distribution="normal", std=1e-9)}
 @pytest.fixture(scope="module")
 def both(tmp_path_factory):
     corner = write_environment(tmp_path_factory.mktemp("arms"), "corner", CORNER)
-    return tcs.score("shaving", corner, "pr2", arms="both", approach=False)
+    return tcs.score("shaving", corner, "pr2", arms="both", paper=True)
 
 
 @pytest.fixture(scope="module")

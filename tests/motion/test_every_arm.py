@@ -9,11 +9,11 @@ import pytest
 import yaml
 
 import tcs
-from tcs.files.paths import data_folder
 from tcs.motion import check_plan, evaluate_plan, load_plan, save_plan
+from tests.exact import exact_content
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
-SHAVING = data_folder() / "tasks" / "adl" / "shaving.yaml"
+SHAVING = exact_content("shaving")
 
 
 def at(x, y, yaw, torso=0.0):
@@ -26,7 +26,7 @@ CASES = {
     "five joints, free goal": (
         EXAMPLES / "so101.yaml",
         EXAMPLES / "arm_on_the_table.yaml",
-        EXAMPLES / "feeding_from_any_side.yaml",
+        yaml.safe_load((EXAMPLES / "feeding_from_any_side.yaml").read_text()),
         0,
         at(0.78, 0.2, 180),
         "shoulder_pan",
@@ -38,11 +38,9 @@ CASES = {
 @pytest.fixture(scope="module", params=CASES)
 def planned(request, tmp_path_factory):
     """The plan of one goal, and the name of the arm's first joint."""
-    robot, environment, given, goal, only, first = CASES[request.param]
-    task = yaml.safe_load(given.read_text())
-    task["goals"] = [task["goals"][goal]]
-    path = tmp_path_factory.mktemp("arm") / given.name
-    path.write_text(yaml.safe_dump(task))
+    robot, environment, task, goal, only, first = CASES[request.param]
+    path = tmp_path_factory.mktemp("arm") / f"{task['name']}.yaml"
+    path.write_text(yaml.safe_dump({**task, "goals": [task["goals"][goal]]}))
     file = tcs.score(path, environment, robot, jobs=1, only=only, approach=False)
     return tcs.plan(file, [0]), first
 

@@ -8,13 +8,13 @@ import yaml
 
 import tcs
 from tcs.errors import TaskError, TcsError, UnknownNameError
-from tcs.files.paths import data_folder
 from tcs.kernel.motion.edges import posture_contact
 from tcs.model.tasks import KeepOut, load_task
 from tcs.motion import Stop
 from tcs.motion.keep_out import scene_with_keep_out
 from tcs.motion.recheck import StopCheck
 from tcs.placement.scoring.rebuild import rebuild_scenes
+from tests.exact import exact_content
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +78,7 @@ def test_the_scene_with_walls_serves_again_where_they_are_the_same(stop):
 
 
 def shaving_with(change, path):
-    task = yaml.safe_load((data_folder() / "tasks" / "adl" / "shaving.yaml").read_text())
+    task = exact_content("shaving")
     change(task["keep_out"][0])
     path.write_text(yaml.safe_dump(task))
     return path

@@ -21,7 +21,7 @@ PLACES = ("base_x = 0.6 m", "base_y = -0.9 m", "base_yaw = 0..90 deg", "torso = 
 @pytest.fixture(scope="module")
 def file():
     """Shaving from one base position with several headings."""
-    return tcs.score("shaving", "wheelchair", "pr2", only=PLACES, approach=False)
+    return tcs.score("shaving", "wheelchair", "pr2", only=PLACES, paper=True)
 
 
 @pytest.fixture(scope="module")

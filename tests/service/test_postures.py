@@ -20,9 +20,7 @@ pytestmark = pytest.mark.usefixtures("in_process")
 def path(tmp_path_factory):
     folder = tmp_path_factory.mktemp("postures")
     environment = write_environment(folder, "corner", CORNER)
-    tcs.save(
-        folder / "corner.tcs", tcs.score("shaving", environment=str(environment), approach=False)
-    )
+    tcs.save(folder / "corner.tcs", tcs.score("shaving", environment=str(environment), paper=True))
     return folder / "corner.tcs"
 
 

@@ -21,9 +21,7 @@ GRID = {**BESIDE, "base_x": (0.2, STEP, 6), "base_y": (0.6, STEP, 3)}
 def path(tmp_path_factory):
     folder = tmp_path_factory.mktemp("rescoring")
     environment = write_environment(folder, "beside", GRID)
-    tcs.save(
-        folder / "beside.tcs", tcs.score("shaving", environment=str(environment), approach=False)
-    )
+    tcs.save(folder / "beside.tcs", tcs.score("shaving", environment=str(environment), paper=True))
     return folder / "beside.tcs"
 
 
@@ -121,7 +119,7 @@ def test_the_changed_environment_can_be_scored_again_by_its_file(engine, rescore
     )
     scene = tmp_path / "changed.yaml"
     scene.write_text(engine.environment_of(digest), encoding="utf-8")
-    again = tcs.score("shaving", environment=str(scene), approach=False)
+    again = tcs.score("shaving", environment=str(scene), paper=True)
     np.testing.assert_array_equal(again.nominal.scores.reached, file.nominal.scores.reached)
     assert "joints" in scene.read_text()
 

@@ -23,9 +23,7 @@ def path(tmp_path_factory):
     """A score file of shaving at a wheelchair with few base poses."""
     folder = tmp_path_factory.mktemp("sets")
     path = folder / "corner.tcs"
-    tcs.save(
-        path, tcs.score("shaving", write_environment(folder, "corner", CORNER), approach=False)
-    )
+    tcs.save(path, tcs.score("shaving", write_environment(folder, "corner", CORNER), paper=True))
     return path
 
 

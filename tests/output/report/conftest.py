@@ -16,6 +16,6 @@ def score_path(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
     environment = write_environment(folder, "small-wheelchair", BESIDE)
     path = folder / "shaving-small-wheelchair-pr2.tcs"
-    file = score("shaving", environment, approach=False)
+    file = score("shaving", environment, paper=True)
     save_scores(path, robustify(file, sets=12, samples=32))
     return path

@@ -282,7 +282,7 @@ def test_commands_make_the_same_again(report, score_path):
     words = shlex.split(score_command(report))
     environment = str(score_path.parent / "small-wheelchair.yaml")
     assert words[:7] == ["tcs", "score", "shaving", "--environment", environment, "--robot", "pr2"]
-    words.remove("--no-approach")
+    words.remove("--paper")
     options = dict(zip(words[7::2], words[8::2], strict=True))
     assert options == {
         "--measure": "isotropy",
@@ -314,7 +314,7 @@ def test_on_the_command_line(score_path, tmp_path, undrawn):
 
 def test_a_file_without_reached_goals_has_a_page(tmp_path):
     path = tmp_path / "far.tcs"
-    save_scores(path, score("shaving", write_environment(tmp_path, "far", FAR), approach=False))
+    save_scores(path, score("shaving", write_environment(tmp_path, "far", FAR), paper=True))
     found = make_score_report(path, sizes=CHECK)
     assert found.is_sound
     wording = as_markdown(make_score_page(found, command="c"))

@@ -28,7 +28,7 @@ SMALL_BED = {
 def file(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bed")
     environment = write_environment(folder, "small-bed", SMALL_BED, based_on="bed", observed={})
-    return score("scratching_chest", environment, approach=False)
+    return score("scratching_chest", environment, paper=True)
 
 
 def test_each_panel_shows_its_own_state(file):

@@ -125,7 +125,7 @@ def posture_of(corners, way):
 
 
 def test_the_command_plays_a_plan(moved, scene, monkeypatch, tmp_path):
-    job = load_job("shaving", "wheelchair", "pr2")
+    job = load_job("shaving", "wheelchair", "pr2", paper=True)
     hand = PlanHand(job, scene, tuple(range(8)))
     monkeypatch.setattr(plan_view, "hands_of", lambda *_, meshes: {"": hand})
     assert make_plan_view(moved).title.endswith("wheelchair · Willow Garage PR2, left arm")

@@ -55,7 +55,7 @@ def built(monkeypatch, scene):
 
     def scored_scenes(_file, _shown, *, meshes):
         requested.append(meshes)
-        return (ScoredScene(load_job("shaving", "wheelchair", "pr2"), scene),)
+        return (ScoredScene(load_job("shaving", "wheelchair", "pr2", paper=True), scene),)
 
     monkeypatch.setattr(score_view, "scored_scenes", scored_scenes)
     return requested

@@ -26,7 +26,7 @@ OBSTACLES = (
 @pytest.fixture(scope="module")
 def corner(tmp_path_factory):
     path = write_environment(tmp_path_factory.mktemp("blocking"), "corner", CORNER)
-    return score("shaving", path, approach=False), load_job("shaving", path, "pr2")
+    return score("shaving", path, paper=True), load_job("shaving", path, "pr2", paper=True)
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +102,7 @@ def test_the_stored_shapes_hold_at_every_torso_level(corner):
 
 
 def test_the_stored_shapes_of_an_arm_that_drives_and_slides_are_where_drake_has_them(rng):
-    job = load_job("feeding", "wheelchair", "stretch")
+    job = load_job("feeding", "wheelchair", "stretch", paper=True)
     scene = job.scene()
     shapes = RobotShapes.from_dict(robot_shapes(job.lowered(scene).arrays).to_dict())
     lower, upper = scene.arm_limits

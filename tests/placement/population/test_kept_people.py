@@ -30,7 +30,7 @@ def file(tmp_path_factory):
     return tcs.score(
         "shaving",
         write_environment(tmp_path_factory.mktemp("corner"), "corner", CORNER),
-        approach=False,
+        paper=True,
     )
 
 

@@ -26,7 +26,7 @@ def corner(tmp_path_factory):
 @pytest.fixture(scope="module")
 def found(corner):
     """The score file of shaving there, and the population of PEOPLE and the papers' man."""
-    file = tcs.score("shaving", corner, approach=False)
+    file = tcs.score("shaving", corner, paper=True)
     man = papers_man()
     values = np.vstack([PEOPLE.values, [man.measures[name] for name in PEOPLE.measures]])
     people = Bodies(PEOPLE.measures, np.append(PEOPLE.is_male, True), values)
@@ -46,7 +46,7 @@ def test_the_papers_man_is_served_as_scored(found):
 def test_a_person_is_served_as_if_scored_alone(found, corner):
     _, result = found
     body = PEOPLE[0]
-    alone = tcs.score("shaving", corner, person={"sex": body.sex, **body.measures}, approach=False)
+    alone = tcs.score("shaving", corner, person={"sex": body.sex, **body.measures}, paper=True)
     reached = alone.nominal.scores.reached
     for one in result.sets:
         np.testing.assert_array_equal(one.reached[0], reached[list(one.indices)].any(axis=0))

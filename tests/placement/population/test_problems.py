@@ -11,7 +11,7 @@ from tests.environments import CORNER, write_environment
 
 @pytest.mark.parametrize("robot", ["pr2", "stretch"])
 def test_the_problem_of_the_papers_man_is_that_of_the_scene(robot, tmp_path):
-    job = load_job("shaving", write_environment(tmp_path, "corner", CORNER), robot)
+    job = load_job("shaving", write_environment(tmp_path, "corner", CORNER), robot, paper=True)
     arrays = job.lowered(job.scene()).arrays
     # Paddings by which the shapes of the arm can be told apart.
     pad = np.linspace(0.0, 0.01, len(arrays.arm.pad))

@@ -50,7 +50,7 @@ HERE = tcs.InitialConfiguration(base_x=1.4, base_y=-1.2, base_yaw=3.14, torso=0.
 def scored(tmp_path_factory):
     environment = tmp_path_factory.mktemp("beside") / "beside.yaml"
     environment.write_text(BESIDE)
-    return tcs.score("shaving", environment, approach=False)
+    return tcs.score("shaving", environment, paper=True)
 
 
 @pytest.fixture(scope="module")

@@ -146,7 +146,7 @@ def environment(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def scored(environment):
-    return tcs.score("shaving", environment, approach=False)
+    return tcs.score("shaving", environment, paper=True)
 
 
 @pytest.fixture(scope="module")
@@ -175,7 +175,7 @@ def test_the_first_start_is_the_surest_pair_of_all_candidates(scored, search):
 
 @pytest.fixture(scope="module")
 def of_three(environment):
-    return tcs.score("shaving", environment, max_members=3, approach=False)
+    return tcs.score("shaving", environment, max_members=3, paper=True)
 
 
 def test_the_third_member_recovers_most_of_what_a_pair_loses(of_three, search):

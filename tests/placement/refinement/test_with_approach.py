@@ -17,6 +17,7 @@ from tcs.placement.robustness import PerturbedPoints, Trials
 from tcs.placement.scoring.rebuild import rebuild_scenes
 from tcs.placement.tables import Reason, RefinedSet
 from tests.beside import BESIDE
+from tests.exact import exact_task
 
 APPROACH = (Reason.APPROACH_LIMITS, Reason.APPROACH_BLOCKED)
 SAMPLES = 12
@@ -24,9 +25,10 @@ SAMPLES = 12
 
 @pytest.fixture(scope="module")
 def scored(tmp_path_factory):
-    environment = tmp_path_factory.mktemp("beside") / "beside.yaml"
+    folder = tmp_path_factory.mktemp("beside")
+    environment = folder / "beside.yaml"
     environment.write_text(BESIDE)
-    return tcs.score("shaving", environment)
+    return tcs.score(exact_task("shaving", folder), environment)
 
 
 @pytest.fixture(scope="module")
@@ -105,7 +107,7 @@ def test_under_error_a_goal_has_to_be_approachable_where_it_is_then(scored):
     np.testing.assert_array_equal(reasons == Reason.REACHED, found)
     assert np.isin(reasons, APPROACH).any()
     # Live scoring builds the displaced scene by itself.
-    live = tcs.LiveScorer("shaving", scored.metadata["environment"])
+    live = tcs.LiveScorer(scored.metadata["task"], scored.metadata["environment"])
     for sample in (0, SAMPLES - 1):
         positions, _ = trials.positions(0, {n: v[[sample]] for n, v in offsets.items()})
         joints = {name: float(positions[name][0]) for name in offsets}

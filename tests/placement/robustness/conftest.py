@@ -32,13 +32,13 @@ def environments(tmp_path_factory):
 @pytest.fixture(scope="session")
 def chair_file(environments):
     """Shaving in the wheelchair, from a few base poses."""
-    return score("shaving", environments["chair"], approach=False)
+    return score("shaving", environments["chair"], paper=True)
 
 
 @pytest.fixture(scope="session")
 def bed_file(environments):
     """Bathing on the bed, from a few base poses, for two shifts of the person."""
-    return score("bathing", environments["bed"], approach=False)
+    return score("bathing", environments["bed"], paper=True)
 
 
 @pytest.fixture(scope="session")

@@ -21,7 +21,7 @@ NOTHING = {
 @pytest.mark.slow
 @pytest.mark.parametrize(("task", "environment"), task_environment_pairs())
 def test_without_error_every_row_gives_its_offline_score(task, environment, rng):
-    file = score(task, environment, approach=False)
+    file = score(task, environment, paper=True)
     trials = Trials.of(file, errors=NOTHING[environment.split("-")[0]])
     sets = file.nominal.sets
     for select in ("best", "single"):

@@ -17,10 +17,10 @@ def small_environment(tmp_path_factory):
 @pytest.fixture(scope="session")
 def small_file(small_environment):
     """Shaving, scored in the small environment."""
-    return score("shaving", small_environment, approach=False)
+    return score("shaving", small_environment, paper=True)
 
 
 @pytest.fixture(scope="session")
 def small_job(small_environment):
     """The job behind `small_file`."""
-    return load_job("shaving", small_environment, "pr2")
+    return load_job("shaving", small_environment, "pr2", paper=True)

@@ -51,7 +51,7 @@ def test_approaches_are_scored_where_they_can_be(by_default, corner):
     assert by_default.metadata["approach"] == {"tool_speed": 0.1}
     chosen = score("shaving", corner, approach=True).nominal.scores
     np.testing.assert_array_equal(by_default.nominal.scores.reason, chosen.reason)
-    without = score("shaving", corner, approach=False)
+    without = score("shaving", corner, paper=True)
     assert not {"approach", "no_approach"} & set(without.metadata)
     stopped = np.isin(by_default.nominal.scores.reason, APPROACH)
     assert stopped.any()
@@ -115,7 +115,7 @@ def test_approaches_are_kept_in_blocks(by_default, corner, tmp_path, monkeypatch
             np.testing.assert_array_equal(getattr(file.nominal.scores, name), expected)
     assert again.metadata["timings"]["compile_seconds"] == 0.0
     # The same scores without approach are there too.
-    without = score("shaving", corner, approach=False, blocks=folder)
+    without = score("shaving", corner, paper=True, blocks=folder)
     assert not np.isin(without.nominal.scores.reason, APPROACH).any()
 
 

@@ -29,7 +29,7 @@ from tcs.placement.scoring.approaches import approach_lines
     ],
 )
 def test_approaches_that_only_newton_follows_are_found_and_confirmed_by_drake(robot, at, goal):
-    job = load_job("shaving", "wheelchair", robot)
+    job = load_job("shaving", "wheelchair", robot, paper=True)
     values = job.grid.values(np.array([at]))
     one = single_grid(job.grid.axes, [float(values[axis.name][0]) for axis in job.grid.axes])
     job = dataclasses.replace(job, grid=one)

@@ -35,14 +35,14 @@ def corner(tmp_path_factory):
 @pytest.fixture(scope="module")
 def singles(corner):
     """The file of each arm, scored by itself."""
-    return [score("shaving", corner, "pr2", arms=arm, approach=False) for arm in ("left", "right")]
+    return [score("shaving", corner, "pr2", arms=arm, paper=True) for arm in ("left", "right")]
 
 
 @pytest.fixture(scope="module")
 def both(corner, tmp_path_factory):
     """The file of both arms, as it is read from disk."""
     path = tmp_path_factory.mktemp("both") / "both.tcs"
-    save_scores(path, score("shaving", corner, "pr2", arms="both", approach=False))
+    save_scores(path, score("shaving", corner, "pr2", arms="both", paper=True))
     return load_scores(path)
 
 
@@ -154,7 +154,7 @@ def test_obstacles_block_the_solutions_of_each_arm(both):
 
 
 def test_an_observed_environment_is_scored_with_both_arms(both, corner):
-    live = LiveScorer("shaving", corner, arms="both", approach=False).score()
+    live = LiveScorer("shaving", corner, arms="both", paper=True).score()
     for name in ("reason", "dexterity", "hand"):
         np.testing.assert_array_equal(
             getattr(live.nominal.scores, name), getattr(both.nominal.scores, name)

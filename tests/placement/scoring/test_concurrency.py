@@ -73,7 +73,7 @@ def test_threads_on_one_live_scorer(tmp_path_factory):
     scorer = LiveScorer(
         "shaving",
         write_environment(tmp_path_factory.mktemp("live"), "live", CORNER),
-        approach=False,
+        paper=True,
     )
     observed = [{"person_y": 0.008 * i} for i in range(-4, 4)]
     alone = [digest(scorer.score(one)) for one in observed]

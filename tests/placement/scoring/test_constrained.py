@@ -31,7 +31,7 @@ BOX = tcs.Obstacle(x=0.9, y=-0.6, width=0.4, depth=0.3, yaw=0.3, z_high=0.9)
 def forbidden(small_environment):
     """Shaving, with a region that is forbidden."""
     return tcs.score(
-        "shaving", small_environment, constraints=tcs.Constraints(forbid=(CORNER,)), approach=False
+        "shaving", small_environment, constraints=tcs.Constraints(forbid=(CORNER,)), paper=True
     )
 
 
@@ -39,7 +39,7 @@ def forbidden(small_environment):
 def blocked(small_environment):
     """Shaving, with a box."""
     return tcs.score(
-        "shaving", small_environment, constraints=tcs.Constraints(blocked=(BOX,)), approach=False
+        "shaving", small_environment, constraints=tcs.Constraints(blocked=(BOX,)), paper=True
     )
 
 
@@ -114,7 +114,7 @@ def test_a_box_is_an_obstacle_of_the_environment(blocked, small_environment, tmp
         f"  - {{name: blocked_1, box: [0.4, 0.3, 0.9], xyz: [0.9, -0.6, 0.45], "
         f"rpy_deg: [0, 0, {math.degrees(0.3)!r}]}}\n"
     )
-    same, found = tcs.score("shaving", path, approach=False).nominal.scores, blocked.nominal.scores
+    same, found = tcs.score("shaving", path, paper=True).nominal.scores, blocked.nominal.scores
     np.testing.assert_array_equal(found.reason, same.reason)
     np.testing.assert_array_equal(found.dexterity, same.dexterity)
     np.testing.assert_array_equal(found.arm_joints, same.arm_joints)
@@ -132,7 +132,7 @@ def test_the_scene_of_the_file_has_the_box(blocked):
 
 def test_live_scoring_honours_constraints(forbidden, small_environment):
     scorer = tcs.LiveScorer(
-        "shaving", small_environment, constraints=tcs.Constraints(forbid=(CORNER,)), approach=False
+        "shaving", small_environment, constraints=tcs.Constraints(forbid=(CORNER,)), paper=True
     )
     live = scorer.score().nominal.scores
     np.testing.assert_array_equal(live.reason, forbidden.nominal.scores.reason)
@@ -140,9 +140,7 @@ def test_live_scoring_honours_constraints(forbidden, small_environment):
 
 def test_an_axis_to_keep_has_one_value(small_environment):
     keep = tcs.Constraints(keep=("torso",))
-    file = tcs.score(
-        "shaving", small_environment, constraints=keep, now={"torso": 0.2}, approach=False
-    )
+    file = tcs.score("shaving", small_environment, constraints=keep, now={"torso": 0.2}, paper=True)
     torso = Grid.from_dict(file.grid).axis("torso")
     assert (torso.count, torso.start) == (1, 0.15)
     assert constraint_texts(file) == ["only torso = 0.15 m"]

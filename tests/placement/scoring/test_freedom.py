@@ -6,8 +6,8 @@ import dataclasses
 
 import numpy as np
 import pytest
+import yaml
 
-from tcs.files.paths import data_folder
 from tcs.kernel.approach import regions
 from tcs.kernel.verification import scans
 from tcs.model.tasks import Freedom
@@ -16,19 +16,16 @@ from tcs.placement.scoring import load_job, score, verify
 from tcs.placement.scoring.drake_check import ROTATION_BAR, DrakeChecker
 from tcs.placement.tables import Reason
 from tests.environments import CORNER, write_environment
+from tests.exact import exact_content, exact_task
 
 
 @pytest.fixture(scope="module")
 def paths(tmp_path_factory):
     """Return shaving with goals that may rotate about y, and an environment."""
     folder = tmp_path_factory.mktemp("free")
-    text = (data_folder() / "tasks/adl/shaving.yaml").read_text()
     task = folder / "shaving_free.yaml"
-    task.write_text(
-        text.replace(
-            "name: shaving\n", "name: shaving_free\nfree: {rotation_about: [0, 1, 0]}\n", 1
-        )
-    )
+    free = {"name": "shaving_free", "free": {"rotation_about": [0, 1, 0]}}
+    task.write_text(yaml.safe_dump(exact_content("shaving") | free))
     return task, write_environment(folder, "free-corner", CORNER)
 
 
@@ -37,8 +34,8 @@ def file(paths):
     return score(*paths)
 
 
-def test_freedom_only_adds_to_what_is_reached(file, paths):
-    fixed = score("shaving", paths[1])
+def test_freedom_only_adds_to_what_is_reached(file, paths, tmp_path):
+    fixed = score(exact_task("shaving", tmp_path), paths[1])
     free, nominal = (f.nominal.scores.reason == Reason.REACHED for f in (file, fixed))
     assert np.all(free | ~nominal)
     assert np.sum(free) > np.sum(nominal) > 0

@@ -88,7 +88,7 @@ def test_an_obstacle_never_makes_a_goal_reachable(small_file, small_environment,
         f"based_on: {small_environment}\nname: cluttered\n"
         "obstacles:\n  - {name: table, box: [0.5, 0.4, 0.9], xyz: [0.9, -0.55, 0.45]}\n"
     )
-    cluttered = score("shaving", path, approach=False).nominal.scores
+    cluttered = score("shaving", path, paper=True).nominal.scores
     assert cluttered.reached.sum() < small_file.nominal.scores.reached.sum()
     # Several convex parts: an obstacle may steer the search to a narrow free stretch that it had
     # no need to look for before, so a rare gain is possible; it must stay rare.

@@ -101,6 +101,6 @@ def test_a_damaged_block_is_told_and_built_again(folder, built, caplog):
 
 def test_a_command_that_was_finished_builds_nothing(small_environment, small_file, folder, built):
     for _ in range(2):
-        file = score("shaving", small_environment, blocks=folder, approach=False)
+        file = score("shaving", small_environment, blocks=folder, paper=True)
         assert_equal(file.nominal.sets, small_file.nominal.sets)
     assert len(built) == 1

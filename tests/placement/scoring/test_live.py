@@ -34,7 +34,7 @@ TABLES = ("reason", "dexterity", "arm_joints")
 @pytest.fixture(scope="module")
 def scorer(small_environment):
     """Shaving in the small environment, ready to be scored."""
-    return LiveScorer("shaving", small_environment, approach=False)
+    return LiveScorer("shaving", small_environment, paper=True)
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def bedside(tmp_path_factory):
 @pytest.fixture(scope="module")
 def bed_scorer(bedside):
     """Shaving there, ready to be scored."""
-    return LiveScorer("shaving", bedside, approach=False)
+    return LiveScorer("shaving", bedside, paper=True)
 
 
 @pytest.fixture
@@ -116,7 +116,7 @@ def test_a_nominal_frame_gives_the_offline_scores_exactly(scorer, small_file, he
 
 @pytest.mark.parametrize("shift", [-0.05, 0.0, 0.1])
 def test_a_stored_shift_gives_its_table_exactly(bed_scorer, bedside, shift):
-    file = score("shaving", bedside, approach=False)
+    file = score("shaving", bedside, paper=True)
     stored = [state["person_y"] for state in file.observed_states]
     table = file.tables[int(np.argmin(np.abs(np.array(stored) - shift)))]
     assert_same_scores(bed_scorer.score({"person_y": shift}).nominal, table)
@@ -150,7 +150,7 @@ def test_drake_confirms_what_was_scored_live(small_environment, tmp_path):
     observation = {"person_x": 0.03, "person_yaw": 0.08, "wheelchair_y": -0.01, "head_tilt": 0.06}
     path = tmp_path / "live.tcs"
     save_scores(
-        path, score_observed("shaving", small_environment, observation=observation, approach=False)
+        path, score_observed("shaving", small_environment, observation=observation, paper=True)
     )
     file = load_scores(path)
     assert file.observed_states[0] == pytest.approx(observation, abs=1e-15)

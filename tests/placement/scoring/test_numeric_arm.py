@@ -49,7 +49,7 @@ def files(tmp_path_factory):
 def scored(files):
     """Feeding, scored."""
     robot, environment = files
-    return score("feeding", environment, robot, approach=False)
+    return score("feeding", environment, robot, paper=True)
 
 
 def test_the_file_records_numeric_ik(scored, tmp_path, capsys):
@@ -99,7 +99,7 @@ def test_it_is_chosen_from_and_explained_like_any_other(scored):
 @pytest.mark.slow
 def test_baxter_feeds_a_person_in_a_wheelchair():
     """The shipped robot with such an arm, on the whole grid."""
-    file = score("feeding", "wheelchair", "baxter", approach=False)
+    file = score("feeding", "wheelchair", "baxter", paper=True)
     assert file.metadata["ik"] == "numeric"
     assert file.nominal.sets.best_single
     single = file.nominal.sets.best_single
@@ -115,7 +115,7 @@ def test_baxter_feeds_a_person_in_a_wheelchair():
 
 def test_jobs_do_not_matter(files, scored):
     robot, environment = files
-    one = score("feeding", environment, robot, jobs=1, approach=False)
+    one = score("feeding", environment, robot, jobs=1, paper=True)
     for name in ("reason", "pair", "dexterity", "arm_joints"):
         first, second = (getattr(f.nominal.scores, name) for f in (one, scored))
         assert (first == second).all(), name

@@ -9,13 +9,13 @@ import pytest
 import yaml
 
 from tcs.errors import ArmClassError, StoreMismatchError
-from tcs.files.paths import data_folder
 from tcs.placement.robustness import evaluate
 from tcs.placement.scoring import LiveScorer, load_job, rebuild_scenes, score
 from tcs.placement.scoring.dry_run import estimate
 from tcs.placement.scoring.offline import load_setups
 from tcs.placement.scoring.rebuild import made_from
 from tests.environments import CORNER, write_environment
+from tests.exact import exact_content
 
 FREE = {"rotation_about": [1, 0, 0], "position": [0, 0.02, 0.02]}
 
@@ -30,8 +30,7 @@ def tasks(tmp_path_factory):
     """Paths of shaving with and without freedom and further poses of its goals."""
     folder, paths = tmp_path_factory.mktemp("tasks"), []
     for name in ("free", "exact"):
-        content = yaml.safe_load((data_folder() / "tasks/adl/shaving.yaml").read_text())
-        content.pop("free", None)
+        content = exact_content("shaving")
         if name == "free":
             content["free"] = FREE
             first = content["goals"][0]

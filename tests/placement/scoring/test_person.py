@@ -41,9 +41,7 @@ def places(tmp_path_factory):
 
 
 def test_the_papers_man_is_scored_as_before(small_environment, small_file):
-    man = tcs.score(
-        "shaving", small_environment, person={"sex": "male", **PAPERS_MAN}, approach=False
-    )
+    man = tcs.score("shaving", small_environment, person={"sex": "male", **PAPERS_MAN}, paper=True)
     for name in ("dexterity", "reason", "arm_joints"):
         before, after = (getattr(f.nominal.scores, name) for f in (small_file, man))
         assert before.tobytes() == after.tobytes()
@@ -65,7 +63,7 @@ slow = pytest.mark.slow
     ],
 )
 def test_scores_of_a_person_hold_in_drake(places, caplog, place, task, person, touching):
-    file = tcs.score(task, places[place], person=person, approach=False)
+    file = tcs.score(task, places[place], person=person, paper=True)
     entry = file.metadata["person"]
     assert entry["given"] == {"model": "person", **person}
     assert {found["goal"]: found["part"] for found in entry["touching_goals"]} == touching

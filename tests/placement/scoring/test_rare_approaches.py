@@ -24,7 +24,7 @@ FREE = {
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", FREE)
 def test_approaches_next_to_limits_are_found_and_true(robot):
-    job = load_job("shaving", "wheelchair", robot)
+    job = load_job("shaving", "wheelchair", robot, paper=True)
     scene = job.scene()
     lowered = job.lowered(scene)
     problem = build_problem(lowered.arrays)

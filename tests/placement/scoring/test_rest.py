@@ -33,7 +33,7 @@ def is_free_at_rest(job, scene, h):
 
 @pytest.mark.parametrize("robot", some_of(["stretch", "pr2", "jaco"], "stretch"))
 def test_what_counts_is_free_at_rest_and_what_is_refused_is_not(robot, rng):
-    job = load_job("feeding", "wheelchair", robot)
+    job = load_job("feeding", "wheelchair", robot, paper=True)
     job = dataclasses.replace(job, grid=thinned(job.grid, 4, (0.5, 0.0)))
     scene = job.scene()
     lowered = job.lowered(scene)
@@ -63,5 +63,5 @@ def test_verify_refutes_a_stop_where_the_arm_at_rest_is_in_contact(tmp_path, mon
     # Straight ahead, into person and chair.
     rests = "rest: {l_elbow_flex_joint: -0.15}\nother_rests: {}\n"
     robot.write_text("based_on: pr2\nname: reaching\ntitle: reaching\n" + rests)
-    file = score("shaving", environment, robot, approach=False)
+    file = score("shaving", environment, robot, paper=True)
     assert verify(file, pairs=8, dense=0).false_reached > 0

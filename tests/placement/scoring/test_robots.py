@@ -15,7 +15,7 @@ from tests.environments import write_environment
 @pytest.mark.parametrize("name", robot_names())
 def test_torso_levels_are_heights_the_robot_has(name):
     robot = load_robot(name)
-    job = load_job("feeding", "wheelchair", robot)
+    job = load_job("feeding", "wheelchair", robot, paper=True)
     levels = job.grid.axis("torso").values
     if robot.torso_joint is None:
         # One height, not three times the same configuration.
@@ -31,7 +31,7 @@ def test_a_wider_contact_margin_leaves_self_collision_as_it_is(small_environment
     environment = load_environment(small_environment).model_copy(update={"contact_margin": 0.002})
     before, after = (
         small_file.nominal.scores,
-        score("shaving", environment, approach=False).nominal.scores,
+        score("shaving", environment, paper=True).nominal.scores,
     )
     lost = (before.reason == Reason.REACHED) & (after.reason != Reason.REACHED)
     touched = {after.pair_names[i][1] for i in after.pair[lost]}
@@ -44,5 +44,5 @@ def test_the_forearm_of_the_ur5_passes_the_head(tmp_path):
     axes = {"base_x": 0.6, "base_y": -0.75, "base_yaw": 0, "torso": 0}
     grid = {axis: (start, 1, 1) for axis, start in axes.items()}
     environment = write_environment(tmp_path, "beside", grid)
-    scores = score("shaving", environment, "ur5", approach=False).nominal.scores
+    scores = score("shaving", environment, "ur5", paper=True).nominal.scores
     assert scores.reason[0, 1] == Reason.REACHED

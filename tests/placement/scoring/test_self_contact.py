@@ -19,7 +19,7 @@ def test_a_pair_that_touches_in_every_posture_is_named(small_environment, robot,
     # Palm and wrist are 1.7 mm apart in every posture.
     wide = robot.model_copy(update={"self_margin": 0.002})
     with caplog.at_level(logging.WARNING):
-        file = score("shaving", small_environment, wide, approach=False)
+        file = score("shaving", small_environment, wide, paper=True)
     found = summary(file)["self_contact"]
     assert found["bodies"] == ["l_wrist_flex_link", "l_gripper_palm_link"]
     assert found["reached"] == 0
@@ -36,7 +36,7 @@ def test_under_other_limits_the_message_points_to_them(small_environment, robot,
     )
     unproven = robot.model_copy(update={"disabled_groups": groups, "limits": "hard"})
     with caplog.at_level(logging.WARNING):
-        file = score("shaving", small_environment, unproven, approach=False)
+        file = score("shaving", small_environment, unproven, paper=True)
     found = file.metadata["self_contact"]
     assert found["refused"] > found["reached"]
     assert "limits: hard" in caplog.text

@@ -72,14 +72,14 @@ def files(tmp_path_factory):
 
 def test_the_arm_is_solved_in_reverse(files):
     robot, environment = files
-    job = load_job("feeding", environment, robot)
+    job = load_job("feeding", environment, robot, paper=True)
     lowered = job.lowered(job.scene())
     assert build_problem(lowered.arrays).arm.free == LAST
 
 
 def test_drake_confirms_what_is_scored_and_the_dense_scan_finds_little_more(files):
     robot, environment = files
-    file = score("feeding", environment, robot, approach=False)
+    file = score("feeding", environment, robot, paper=True)
     assert np.count_nonzero(file.nominal.scores.reached) > 100
     found = verify(file, pairs=100, dense=20)
     assert found.checked == 100

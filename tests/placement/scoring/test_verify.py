@@ -36,7 +36,7 @@ def test_stored_answers_are_true(small_file):
 
 @pytest.mark.parametrize("measure", ["inverse-condition", "isotropy-limited"])
 def test_a_file_is_verified_by_the_measure_it_was_made_with(small_file, small_environment, measure):
-    file = score("shaving", small_environment, measure=measure, approach=False)
+    file = score("shaving", small_environment, measure=measure, paper=True)
     assert file.metadata["measure"] == summary(file)["measure"] == measure
     found = verify(file, pairs=40, dense=10)
     assert found.is_sound
@@ -88,7 +88,7 @@ def test_an_arm_too_close_to_the_person_is_found(small_file, small_environment):
     text = small_environment.read_text().replace("name: small-wheelchair", "name: tight-wheelchair")
     tight = small_environment.parent / "tight-wheelchair.yaml"
     tight.write_text(text + "contact_margin: 0.25\n")
-    job = load_job("shaving", tight, "pr2")
+    job = load_job("shaving", tight, "pr2", paper=True)
     metadata = {
         **small_file.metadata,
         "environment": str(tight),
@@ -231,7 +231,7 @@ def test_recall_is_undefined_where_nothing_is_known_to_be_reachable():
 def test_a_file_that_reaches_nothing_claims_nothing(tmp_path):
     # Bases 4 m from the person: every goal is too far.
     far = write_environment(tmp_path, "far-away", {**BESIDE, "base_x": [5.0, 0.1, 2]})
-    found = verify(score("shaving", far, approach=False), pairs=10, dense=10)
+    found = verify(score("shaving", far, paper=True), pairs=10, dense=10)
     assert (found.checked, found.dense_checked, found.shortfall_checked) == (0, 0, 0)
     assert found.is_sound
     assert found.verdict == "nothing was checked"
