@@ -48,6 +48,7 @@ PARTS: dict[str, tuple[str, ...]] = {
         *(f"{SCORES}/shaving-wheelchair-pr2.tcs", f"{SCORES}/feeding-wheelchair-pr2.tcs"),
         f"{SCORES}/bathing-bed-pr2.tcs",
     ),
+    "done_table": (),
     "motions": (
         *(
             f"{SCORES}/{name}-pr2.tcs"
