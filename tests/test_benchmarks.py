@@ -230,7 +230,7 @@ def test_an_interrupted_run_of_the_robots_is_continued(module, monkeypatch, tmp_
             raise KeyboardInterrupt
         return file
 
-    monkeypatch.setattr(robots, "load_job", lambda _task, _environment, robot: StandIn(robot))
+    monkeypatch.setattr(robots, "load_job", lambda _task, _environment, robot, **_: StandIn(robot))
     monkeypatch.setattr(robots, "score", lambda _task, _environment, robot, **_: StandIn(robot))
     monkeypatch.setattr(robots, "verify", verify)
     path = tmp_path / "rows.jsonl"

@@ -25,7 +25,7 @@ PRINTED = {
     "10_viewer_page": r"wrote .*feeding\.html, [23]\.\d MB",
     "11_drive_an_arm": r"^4\.0 s, 1\.45 m up: joint 6 is at its limit.*the tool by 0\.0\d\d mm\n"
     r"8\.\d s, 1\.5\d m up",
-    "12_turn_the_head": r"0 deg: 75% .*60 deg: 88% .*head_turn_deg",
+    "12_turn_the_head": r"0 deg: 75% .*60 deg: 100% .*head_turn_deg",
     "13_arm_on_the_wheelchair": r"^86% of the goals with the arm 0\.\d\d m ahead .* by \d+ deg$",
     "14_wash_the_trunk": r"^2\d goals, .*one base pose: 14%\nreached from two: 24%",
     "15_hold_and_wipe": r"^by both arms from one base pose: 100%\n.*20 re-checked, 0 false",

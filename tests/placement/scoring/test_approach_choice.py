@@ -51,7 +51,7 @@ def test_approaches_are_scored_where_they_can_be(by_default, corner):
     assert by_default.metadata["approach"] == {"tool_speed": 0.1}
     chosen = score("shaving", corner, approach=True).nominal.scores
     np.testing.assert_array_equal(by_default.nominal.scores.reason, chosen.reason)
-    without = score("shaving", corner, paper=True)
+    without = score("shaving", corner, approach=False)
     assert not {"approach", "no_approach"} & set(without.metadata)
     stopped = np.isin(by_default.nominal.scores.reason, APPROACH)
     assert stopped.any()
