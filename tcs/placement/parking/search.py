@@ -21,7 +21,7 @@ FINENESS = 1.07
 """Ratio of a box that holds and one that does not at which the search is content."""
 COARSE, FINE = 5, 9
 """Places along each side of the lattices by which a box is judged while it grows, and at last."""
-RANDOM = 400
+RANDOM = 256
 """Random base poses in which a window is confirmed."""
 BATCH = 128
 """Base poses that are scored before the next look at what is missed."""
@@ -69,6 +69,8 @@ class WindowSearch:
     """The search around one stop."""
 
     missed: Missed
+    confirming: Missed
+    """The same for the random base poses, as the grid was scored."""
     rng: np.random.Generator
     scored: int = 0
     """Number of base poses that were scored."""
@@ -152,15 +154,15 @@ class WindowSearch:
     def _is_confirmed(self, box: Window) -> bool:
         """Return whether random base poses miss nothing, up to half of the margin outside."""
         wide = (1.0 - MARGIN / 2.0) * np.array(box)
-        return self._finds_none(self.rng.uniform(-1.0, 1.0, (RANDOM, 3)) * wide)
+        return self._finds_none(self.rng.uniform(-1.0, 1.0, (RANDOM, 3)) * wide, self.confirming)
 
-    def _finds_none(self, offsets: FloatArray) -> bool:
+    def _finds_none(self, offsets: FloatArray, missed: Missed | None = None) -> bool:
         """Return whether nothing is missed at offsets; the first miss is kept."""
         ends = [8, 26, *range(26 + BATCH, len(offsets) + BATCH, BATCH)]
         for start, end in itertools.pairwise([0, *ends]):
             part = offsets[start:end]
             self.scored += len(part)
-            found = self.missed(part)
+            found = (missed or self.missed)(part)
             lost = np.flatnonzero(found.any(axis=1))
             if lost.size:
                 for row in lost:

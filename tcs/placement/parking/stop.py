@@ -32,8 +32,11 @@ BASE = slice(-len(ROBOT_AXES), -1)
 class _OfHand(NamedTuple):
     """The goals of a stop that one hand may serve."""
 
-    scorer: Scorer
-    """Stops at the first posture that is found, which takes less time where something is free."""
+    thorough: Scorer
+    """Maximises the measure of the file, as its grid was scored."""
+    quick: Scorer | None
+    """Stops at the first posture that is found, which takes less time where something is free, but
+    leads to fewer approaches; None where nothing is free."""
     goals: list[int]
     """Numbers among those of the stop."""
     torso: int
@@ -55,11 +58,13 @@ class ParkedStop:
     hands: tuple[_OfHand, ...]
     """Empty where two arms work at the same time: the scorer of the table checks them then."""
 
-    def missed(self, offsets: FloatArray) -> BoolArray:
+    def missed(self, offsets: FloatArray, *, thorough: bool = False) -> BoolArray:
         """Return which goals are not reached, or not approached, with the base off its place.
 
         Args:
             offsets: In x and y [m] and in heading [rad], shape (n, 3).
+            thorough: Whether all is scored as the grid was; if not, only what is missed from the
+                first posture that is found.
 
         Returns:
             Shape (n, goals of the stop).
@@ -71,17 +76,24 @@ class ParkedStop:
         missed = np.ones((len(points), len(self.goals)), dtype=np.bool_)
         allowed = np.flatnonzero(~self.scorer.forbidden(points))
         parts = np.array_split(allowed, self.scorer.jobs if len(allowed) > FEW else 1)
-        found = self.threads.map(lambda part: self._missed(points[part]), parts)
+        found = self.threads.map(lambda part: self._missed(points[part], thorough), parts)
         missed[allowed] = np.concatenate(list(found))
         return missed
 
-    def _missed(self, points: FloatArray) -> BoolArray:
+    def _missed(self, points: FloatArray, thorough: bool) -> BoolArray:
         missed = np.ones((len(points), len(self.goals)), dtype=np.bool_)
         x, y, yaw = (np.ascontiguousarray(column) for column in points[:, BASE].T)
         for hand in self.hands:
             state = np.zeros(len(points), np.int64)
-            scores = hand.scorer.score(Rows(state, x, y, yaw, state + hand.torso))
-            missed[:, hand.goals] &= scores.reason != Reason.REACHED
+            rows = Rows(state, x, y, yaw, state + hand.torso)
+            left = np.arange(len(points))
+            if hand.quick is not None and not thorough:
+                reason = hand.quick.score(rows).reason
+                missed[:, hand.goals] &= reason != Reason.REACHED
+                left = np.flatnonzero(np.any(reason != Reason.REACHED, axis=1))
+            if left.size:
+                reason = hand.thorough.score(rows.at(left)).reason
+                missed[np.ix_(left, np.array(hand.goals))] &= reason != Reason.REACHED
         return missed
 
 
@@ -106,7 +118,7 @@ class StopScorers:
     known: dict[tuple[float, ...], _Surroundings] = field(default_factory=dict, repr=False)
     """Those of the stops so far, by hand, state and torso height."""
     approaches: dict[tuple[float, ...], ApproachScorer] = field(default_factory=dict, repr=False)
-    """Who scores approaches, by hand and the torso height if that is none of the grid."""
+    """Who scores approaches, by hand and the torso height if the grid lacks it."""
 
     def at(self, values: FloatArray, goals: Sequence[int]) -> ParkedStop:
         """Return a stop.
@@ -130,17 +142,20 @@ class StopScorers:
         hand_goals = self.scorer.hands[number].goals
         places = [hand_goals.index(goal) for goal in goals if goal in hand_goals]
         some = arrays_of_goals(arrays, places)
-        measure = ANY_SOLUTION if len(arrays.freedom) else every.measure
         problem = every._replace(
-            measure=measure,
             goals=every.goals.at(some.goal_R, some.goal_p)._replace(
                 first_pose=np.array(some.first_pose, dtype=np.int64),
-                freedom=free_goals(some.freedom, some.chain, measure),
+                freedom=free_goals(some.freedom, some.chain, every.measure),
             ),
         )
         approaches = None if of_every is None else of_every.of_goals(problem, places)
+        thorough, quick = Scorer.of(problem, approaches), None
+        if len(some.freedom):
+            first = problem._replace(measure=ANY_SOLUTION)
+            approaches = None if of_every is None else of_every.of_goals(first, places)
+            quick = Scorer(first, thorough.grippers, approaches)
         numbers = [i for i, goal in enumerate(goals) if goal in hand_goals]
-        return _OfHand(Scorer.of(problem, approaches), numbers, torso)
+        return _OfHand(thorough, quick, numbers, torso)
 
     def _surroundings(self, number: int, values: FloatArray) -> _Surroundings:
         """Return what is around one hand at a stop, wherever its base is."""

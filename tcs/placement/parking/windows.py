@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from functools import wraps
+from functools import partial, wraps
 from typing import TYPE_CHECKING, ParamSpec
 
 import numpy as np
@@ -51,7 +51,8 @@ def find_windows(
 
     goals = np.flatnonzero(stop.goals)
     scored = _prepared(file, table, on_compile).at(stop.values, goals.tolist())
-    search = WindowSearch(scored.missed, named_generator(0, "parking"))
+    confirming = partial(scored.missed, thorough=True)
+    search = WindowSearch(scored.missed, confirming, named_generator(0, "parking"))
     window = search.window(least)
     found = WindowTable.empty(stop.values.size, stop.goals.size)
     if window is None and least is None:

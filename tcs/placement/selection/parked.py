@@ -72,7 +72,7 @@ class Windows:
         """Return the window of a stop, looked for if it is not known.
 
         Raises:
-            SelectionError: If it is not known, and nobody looks for it.
+            SelectionError: If it is not known, and cannot be looked for.
         """
         known = self.known
         found = None if known is None else known.window(*stop, least)

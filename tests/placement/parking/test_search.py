@@ -20,7 +20,7 @@ def search_in(region, goals=1):
     def missed(offsets):
         return np.repeat(~region(offsets)[:, None], goals, axis=1)
 
-    return WindowSearch(missed, np.random.default_rng(0))
+    return WindowSearch(missed, missed, np.random.default_rng(0))
 
 
 def box(x, y, yaw):
@@ -98,7 +98,7 @@ def test_the_goals_that_are_missed_are_named():
     def missed(offsets):
         return np.stack([offsets[:, 0] > 0.02, np.zeros(len(offsets), np.bool_)], axis=1)
 
-    search = WindowSearch(missed, np.random.default_rng(0))
+    search = WindowSearch(missed, missed, np.random.default_rng(0))
     assert search.window(PROPORTIONS) is None
     assert {miss.goals for miss in search.misses} == {(0,)}
 
