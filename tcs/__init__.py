@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from tcs.files.blocks import BlockFolder
     from tcs.model.grid import InitialConfiguration
     from tcs.model.scene import Observation
-    from tcs.motion import MotionPlan, evaluate, examine, plan
+    from tcs.motion import MotionPlan, evaluate, examine, plan, refine, robustify
     from tcs.placement.constraints import Constraints, Obstacle, Region
     from tcs.placement.parking import select
     from tcs.placement.population import Population, population
     from tcs.placement.reasons import Explanation, explain
-    from tcs.placement.refinement import Placement, place, refine
-    from tcs.placement.robustness import Evaluation, robustify
+    from tcs.placement.refinement import Placement, place
+    from tcs.placement.robustness import Evaluation
     from tcs.placement.scoring import (
         LiveScorer,
         Verification,
@@ -109,8 +109,8 @@ _HOMES = {
     "place": ("tcs.placement.refinement", "place"),
     "plan": ("tcs.motion", "plan"),
     "population": ("tcs.placement.population", "population"),
-    "refine": ("tcs.placement.refinement", "refine"),
-    "robustify": ("tcs.placement.robustness", "robustify"),
+    "refine": ("tcs.motion", "refine"),
+    "robustify": ("tcs.motion", "robustify"),
     "save": ("tcs.placement.store", "save_scores"),
     "score": ("tcs.placement.scoring", "score"),
     "score_observed": ("tcs.placement.scoring", "score_observed"),

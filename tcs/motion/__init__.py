@@ -16,7 +16,7 @@ from tcs.motion.plan_check import PlanCheck, check_plan
 from tcs.motion.plan_files import save_plan
 from tcs.motion.plan_success import PlanSuccess, evaluate_plan
 from tcs.motion.plans import plan
-from tcs.motion.rooms import evaluate
+from tcs.motion.rooms import evaluate, refine, robustify
 from tcs.motion.stops import Stop
 from tcs.motion.stored_plan import load_plan
 from tcs.motion.timing import Timed
@@ -42,5 +42,7 @@ __all__ = [
     "examine",
     "load_plan",
     "plan",
+    "refine",
+    "robustify",
     "save_plan",
 ]

@@ -22,7 +22,7 @@ from tcs.model.grid import ROBOT_AXES
 from tcs.model.scene import environment_at, torso_at
 from tcs.motion.examine import ReachableGoals
 from tcs.motion.stops import StopGrid
-from tcs.placement import robustness
+from tcs.placement import refinement, robustness
 from tcs.placement.robustness.perturbed_points import PerturbedPoints, PointScores
 from tcs.placement.robustness.trials import HandTrials, Progress, counter
 from tcs.placement.tables import MotionOutcome
@@ -209,3 +209,5 @@ def _with_motions(function: Callable[P, R]) -> Callable[P, R]:
 
 
 evaluate = _with_motions(robustness.evaluate)
+robustify = _with_motions(robustness.robustify)
+refine = _with_motions(refinement.refine)

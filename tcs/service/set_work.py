@@ -50,7 +50,8 @@ class SetWork:
         Raises:
             TcsError: As `tcs.refine`.
         """
-        from tcs.placement.refinement import refine, refinement_summary
+        from tcs.motion import refine
+        from tcs.placement.refinement import refinement_summary
 
         file = self._files.for_scene(request.file)
         table = table_of(file, request)

@@ -14,7 +14,7 @@ from tcs.motion.recheck import StopCheck
 from tcs.motion.rooms import done_in_rooms, in_rooms
 from tcs.motion.stop_tour import plan_stop
 from tcs.placement import robustness
-from tcs.placement.robustness import PerturbedPoints, Trials
+from tcs.placement.robustness import PerturbedPoints, Trials, estimation
 from tcs.placement.store import PAPER
 from tests.environments import CORNER, write_environment
 
@@ -124,3 +124,39 @@ def test_drake_finds_the_motions_of_a_room_free(file):
     stop.scene.set_joint("person_y", float(samples.positions(hand, {})["person_y"][room]) + 0.3)
     moved = StopCheck(stop, None)
     assert sum(moved.false_pieces(segment) for segment in planned.segments) > 0
+
+
+@pytest.fixture(scope="module")
+def estimated(file):
+    return tcs.robustify(file, samples=24, sets=20, jobs=1)
+
+
+def test_the_most_robust_set_is_one_whose_motions_are_judged(file, estimated):
+    (settings,) = estimated.metadata["robustness"]
+    assert (settings["done_by"], settings["body_collisions"]) == ("motion", "all")
+    success = estimated.nominal.success
+    assert success.counts_rooms
+    best = success.most_robust(estimated.nominal.sets)
+    trials = Trials.of(file)
+    offsets = trials.errors.draw(24, 0, stream=estimation.ESTIMATION_STREAM)
+    samples, points = PerturbedPoints(trials, offsets, 1), trials.points(best)
+    done = done_in_rooms(samples, points, samples.scores(points), np.arange(24), seed=0)
+    row = success.row_of(best)
+    assert success.success[row] == done.all(axis=1).mean()
+    approached = robustness.robustify(file, samples=24, sets=20, jobs=1).nominal.success
+    assert np.array_equal(approached.members, success.members)
+    # Motions take goals away, and add none.
+    assert np.all(success.success <= approached.success + 1e-12)
+
+
+def test_what_robustify_finds_is_selected_evaluated_and_stored(estimated, tmp_path):
+    best = estimated.nominal.success.most_robust(estimated.nominal.sets)
+    choice = tcs.select(estimated)
+    assert (choice.basis, choice.indices) == ("success", best)
+    plain = choice.to_json("isotropy")
+    assert plain["rooms_done"] == plain["success"]
+    found = tcs.evaluate(estimated, samples=2, select="robust", jobs=1)
+    assert tuple(found.sets[0]) == best
+    tcs.save(tmp_path / "robust.tcs", estimated)
+    again = tcs.load(tmp_path / "robust.tcs").nominal.success
+    assert np.array_equal(again.rooms_done, estimated.nominal.success.rooms_done)

@@ -122,6 +122,11 @@ def report_robustified(result: Mapping[str, Any]) -> None:
                 "; ".join(member_text(member) for member in refined["members"]),
             )
     out.print(table)
+    for row in result["tables"]:
+        by = row["settings"].get("done_by")
+        if by is not None and any(best["rooms_done"] == best["success"] for best in row["best"]):
+            out.print(f"success: the fraction of rooms in which all goals are done; {DONE_BY[by]}")
+            break
     out.print(f"wrote {result['file']}. To select by success, with the current base X Y YAW_DEG:")
     typer.echo(f"tcs select {shlex.quote(result['file'])} --here X Y YAW_DEG --delta 1")
 

@@ -35,6 +35,7 @@ from tcs.output.words import (
     stop_places,
     stop_windows,
 )
+from tcs.output.words.success import success_text
 from tcs.output.words.verification import check_lines
 
 NUMERIC_NOTE = (
@@ -230,10 +231,9 @@ def report_choice(result: Mapping[str, Any]) -> None:
         out.print(f"parking windows of {sets:,} set{'s' * (sets > 1)} were looked at")
     if "success" in result:
         low, high = result["success_ci95"]
-        out.print(
-            f"under error {result['success']:.1%} of the goals (95 % between {low:.1%} and "
-            f"{high:.1%})"
-        )
+        of_rooms = result.get("rooms_done") == result["success"]
+        text = success_text(f"{result['success']:.1%}", of_rooms=of_rooms)
+        out.print(f"under error {text} (95 % between {low:.1%} and {high:.1%})")
     if result["moves"]:
         out.print(f"moves the environment: {', '.join(axis_name(n) for n in result['moves'])}")
     if "executable" in result:

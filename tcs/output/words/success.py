@@ -23,6 +23,15 @@ DONE_BY = {
 """By what a goal is done in a sample."""
 
 
+def success_text(success: str, *, of_rooms: bool) -> str:
+    """Return what a success under error means.
+
+    >>> success_text("95 %", of_rooms=True)
+    'all goals done in 95 % of rooms'
+    """
+    return f"all goals done in {success} of rooms" if of_rooms else f"{success} of the goals"
+
+
 def error_width(error: Mapping[str, Any]) -> str:
     """Return the width of the distribution of an error.
 

@@ -40,6 +40,7 @@ from tcs.placement.refinement.surest import (
 )
 from tcs.placement.robustness import PerturbedPoints, Trials, with_success
 from tcs.placement.robustness.body_collisions import check_body_collisions, default_collisions
+from tcs.placement.robustness.evaluation import Judge
 from tcs.placement.selection import Top, UtilityWeights, select
 from tcs.placement.selection.choice import SelectionTables
 from tcs.placement.store import ScoreFile
@@ -82,6 +83,7 @@ def refine(
     samples: int | None = None,
     keep_success: bool = True,
     body_collisions: str | None = None,
+    judge: Judge | None = None,
     seed: int = 0,
     table: int | None = None,
     jobs: int = 2,
@@ -110,6 +112,8 @@ def refine(
         body_collisions: Collisions of the robot's body that count under the errors of the
             environment, one of `BODY_COLLISIONS`; by default all, in a file scored as the paper
             does `paper`. Without errors all count, as when scoring.
+        judge: Judges motions where the success of the file's sets was estimated by them, as for
+            `tcs.placement.robustness.robustify`; `tcs.refine` passes it.
         seed: Seed of the search and of the samples; the result is the same for any number of
             jobs.
         table: Number of the table; by default the nominal one. The others keep what they have.
@@ -174,11 +178,11 @@ def refine(
     fresh = RememberedSamples(judging)
     needed = None
     if keep:
-        screen, judge = (
+        screen, floor = (
             _floor(search, of, sets) for of in (fresh.hardest(judges // HARDEST), fresh)
         )
-        walks = settled(walks, screen, judge)
-        needed = judge.keeps_of_sets
+        walks = settled(walks, screen, floor)
+        needed = floor.keeps_of_sets
     elif by_success:
         choosing = RememberedSamples(draw(judges, CHOICE_STREAM))
         walks = at_surest(walks, choosing, sets.weights)
@@ -186,7 +190,7 @@ def refine(
     first = without_idle_members(walks[0], search.objective, needed)
     walks = [first, *walks[1:]]
     made = as_table(walks, sets.weights, has_hands=bool(file.hands))
-    refined = with_estimates(file, number, scorer, made)
+    refined = with_estimates(file, number, scorer, made, judge)
     success = _success(search, walks[0], fresh, sets) if keep or by_success else None
     settings = {
         "program_version": version("tcs"),
@@ -312,7 +316,11 @@ def as_table(
 
 
 def with_estimates(
-    file: ScoreFile, table: int, scorer: PointScorer, refined: RefinedTable
+    file: ScoreFile,
+    table: int,
+    scorer: PointScorer,
+    refined: RefinedTable,
+    judge: Judge | None = None,
 ) -> RefinedTable:
     """Return refined sets with their success if that of the table's sets was estimated.
 
@@ -323,9 +331,10 @@ def with_estimates(
     if file.tables[table].success is None or record is None or not record["environment_errors"]:
         return refined
     trials = Trials.built(file, table, scorer.built, body_collisions=record["body_collisions"])
-    return with_success(
-        trials, refined, samples=record["samples"], seed=record["seed"], jobs=scorer.jobs
-    )
+    if record.get("done_by") != "motion":
+        judge = None
+    drawn = {"samples": record["samples"], "seed": record["seed"], "jobs": scorer.jobs}
+    return with_success(trials, refined, judge=judge, **drawn)
 
 
 def with_refined(

@@ -24,6 +24,7 @@ from tcs.placement.refinement.local_search import (
     Walk,
 )
 from tcs.placement.refinement.success_under_error import RememberedSamples
+from tcs.placement.robustness.kept_pairs import allowed_pairs
 from tcs.placement.selection.alternatives import Distinct
 from tcs.placement.tables import SetTable
 
@@ -154,7 +155,7 @@ def surest_pairs(
     for stage, remaining in zip(range(staged.stages), PAIRS, strict=False):
         points = search.points_of(sets.candidates[members].tolist())
         features = staged.features(points, stage)
-        allowed = np.triu(_allowed(sets, members, members), 1)
+        allowed = np.triu(allowed_pairs(sets, members, members), 1)
         preference = PREFERENCE * (scores[members][:, None] + scores[members])
         first, second = best_pairs(features, features, allowed, preference, remaining)
         pairs = members[first], members[second]
@@ -198,7 +199,7 @@ def surest_triples(
             continue
         members = np.searchsorted(sets.candidates, pair)
         others = np.sort(np.argsort(-scores, kind="stable")[:MOST_CANDIDATES])
-        others = others[np.all(_allowed(sets, others, members), axis=1)]
+        others = others[np.all(allowed_pairs(sets, others, members), axis=1)]
         for stage, remaining in zip(range(staged.stages), THIRDS, strict=False):
             of_pair = staged.features(points, stage).max(axis=0)
             third = staged.features(search.points_of(sets.candidates[others].tolist()), stage)
@@ -212,16 +213,6 @@ def surest_triples(
             if staged.successes([search.points_of(triple)], staged.stages - 1)[0] > of_two + GAIN
         ]
     return found
-
-
-def _allowed(sets: SetTable, first: IntArray, second: IntArray) -> BoolArray:
-    """Return which pairs of candidates keep the rules of the table's sets, shape (n, m)."""
-    at = sets.cell_xy[sets.cell]
-    distance = np.hypot(*(at[first][:, None] - at[second]).transpose(2, 0, 1))
-    allowed = distance >= sets.min_distance - 1e-9
-    if sets.same_environment:
-        allowed &= sets.state[first][:, None] == sets.state[second]
-    return np.asarray(allowed)
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import Any
 
@@ -15,8 +15,10 @@ from tcs.errors import TcsError
 from tcs.files.blocks import BlockFolder
 from tcs.model.grid import Grid
 from tcs.model.random_streams import check_draws
+from tcs.placement.robustness.evaluation import Judge, done_by
 from tcs.placement.robustness.kept_pairs import EQUAL_REACHABILITY, Pairs, kept_pairs
 from tcs.placement.robustness.perturbed_points import PerturbedPoints
+from tcs.placement.robustness.pool import best_sets, pool_of
 from tcs.placement.robustness.statistics import CONFIDENCE, intervals_of
 from tcs.placement.robustness.trials import Errors, Progress, Trials
 from tcs.placement.store import ScoreFile, state_to_json
@@ -33,7 +35,7 @@ from tcs.placement.tables.success import NO_MEMBER
 IntArray = NDArray[np.int64]
 
 SETS = 2000
-"""Greatest number of pairs that get an estimate; a quarter as many singles."""
+"""Greatest number of pairs that get an estimate; a quarter as many of other sets."""
 MIN_CONTENDERS = 200
 """If fewer sets than this are equal in P_R to the best, the next best are added."""
 SCREENED = 32
@@ -41,6 +43,15 @@ SCREENED = 32
 again, so that the selection does not bias its estimates."""
 MOST_SCREENED = 800
 """Greatest number of configurations evaluated on these samples, those with the best scores."""
+FINALISTS, FINALISTS_OF_ONE, LAST = 4, 2, 2
+"""Number of sets, and of single configurations, whose motions are judged, those with the greatest
+lower bounds; and of these the better ones, judged in more samples."""
+FIRST_JUDGED, MOST_JUDGED = 128, 512
+"""Number of samples in which motions are judged: each takes some tens of milliseconds for a set."""
+LEAST_COMPARED = 0.5
+"""Least success by approaches of a set that shows what motions lose: of few samples it is noise."""
+REFINED_JUDGED = 128
+"""Samples in which the motions of refined sets are judged at most: of many, each takes seconds."""
 ESTIMATION_STREAM = "race"
 """Name of the random stream of the estimates. Another name would give other numbers."""
 
@@ -53,6 +64,7 @@ def robustify(
     seed: int = 0,
     errors: Errors = None,
     body_collisions: str | None = None,
+    judge: Judge | None = None,
     tables: Sequence[int] | None = None,
     jobs: int = 2,
     blocks: BlockFolder | None = None,
@@ -61,18 +73,28 @@ def robustify(
 ) -> ScoreFile:
     """Return a score file with estimates of success under error for its best sets.
 
-    Of each size, one and two, the contenders are the sets with P_R of at least 98 % of the greatest
-    of that size. If there are too many, those that succeed most often in a few separate samples are
-    selected; the sets with the best scores always are. Successive halving evaluates them all on the
-    same samples and gives more samples to the better half of those that may still be the best.
+    The success of a set is the fraction of the samples in which all goals are done from it, as
+    `tcs.evaluate` counts it. Which sets are estimated does not follow from their scores alone: of a
+    pool of configurations all sets are compared in a few samples (`tcs.placement.robustness.pool`),
+    by postures with their approaches. Successive halving evaluates the best of them on the same
+    samples and gives more samples to the better half of those that may still be the best. Motions
+    are judged for the last few. What motions lose is taken to be as much for the others as for the
+    one of these that loses most, and none of the others is ranked before them.
+
+    By the rules of the paper (`body_collisions` is `paper`), success is the mean of P_R under
+    error. Of each size, one and two, the contenders are then the sets with P_R of at least 98 % of
+    the greatest of that size, and those that succeed most often in a few separate samples if there
+    are too many.
 
     Args:
         file: A score file, which is not modified.
-        sets: Greatest number of pairs; a quarter as many singles.
+        sets: Greatest number of pairs; a quarter as many of other sets.
         samples: Number of samples of the sets that remain to the end.
         seed: Seed of the samples; results are the same for any number of jobs.
         errors: Path of an error file, or errors by joint, in place of those of the environment.
-        body_collisions: Collisions of the robot's body that count, one of `BODY_COLLISIONS`.
+        body_collisions: Collisions of the robot's body that count, one of `BODY_COLLISIONS`; by
+            default all, in a file scored as the paper does `paper`.
+        judge: Judges motions, as for `evaluate`; `tcs.robustify` passes it.
         tables: Numbers of the tables; all by default. The others keep their estimates.
         jobs: Number of threads.
         blocks: Folder in which finished blocks are kept, so that the same call continues after an
@@ -93,8 +115,8 @@ def robustify(
         raise TcsError(f"sets is {sets}; must be 1 to 100,000.")
     trials = Trials.of(file, errors=errors, body_collisions=body_collisions, on_compile=on_compile)
     chosen = range(len(file.tables)) if tables is None else tables
-    rounds = 1 + len(round_sizes(samples))
-    done, total = 0, 2 * rounds * len(chosen)
+    sizes = 2 if trials.is_paper else file.nominal.sets.max_members
+    done, total = 0, (2 + sizes * len(round_sizes(samples))) * len(chosen)
 
     def step() -> None:
         nonlocal done
@@ -106,10 +128,11 @@ def robustify(
     with trials.kept_in(blocks) as kept:
         for number in chosen:
             here = kept.at_table(number)
-            success = success_of(here, sets=sets, samples=samples, seed=seed, jobs=jobs, step=step)
+            drawn = {"samples": samples, "seed": seed, "jobs": jobs}
+            success = success_of(here, sets=sets, judge=judge, step=step, **drawn)
             refined = here.scored.refined
             if refined is not None:
-                refined = with_success(here, refined, samples=samples, seed=seed, jobs=jobs)
+                refined = with_success(here, refined, judge=judge, **drawn)
             scored[number] = dataclasses.replace(here.scored, success=success, refined=refined)
     settings = {
         "program_version": version("tcs"),
@@ -119,6 +142,7 @@ def robustify(
         "errors": trials.errors.to_json(),
         "environment_errors": errors is None,
         "body_collisions": trials.body_collisions,
+        "done_by": done_by(trials, judge),
     }
     # One record for each table, because tables may be estimated at different times.
     records = list(file.metadata.get("robustness", [None] * len(scored)))
@@ -138,7 +162,7 @@ def success_summary(file: ScoreFile) -> dict[str, Any]:
         if success is None:
             continue
         best = []
-        for size in (1, 2):
+        for size in range(1, scored.sets.max_members + 1):
             members = success.most_robust(scored.sets, max_members=size)
             row = success.row_of(members)
             if row is None or len(members) < size:
@@ -148,6 +172,7 @@ def success_summary(file: ScoreFile) -> dict[str, Any]:
                     "members": [grid.configuration(h).to_json() for h in members],
                     "success": float(success.success[row]),
                     "ci95": [float(success.low[row]), float(success.high[row])],
+                    "rooms_done": success.rooms_at(row),
                     "samples": int(success.samples[row]),
                     "sets": int(success.of_size(size).size),
                 }
@@ -175,6 +200,7 @@ def _surest_refined(grid: Grid, refined: RefinedTable | None) -> dict[str, Any] 
         "members": [member.to_json() for member in refined.members(grid, row)],
         "success": float(success.success[row]),
         "ci95": [float(success.low[row]), float(success.high[row])],
+        "rooms_done": success.rooms_at(row),
         "samples": int(success.samples[row]),
         "sets": len(refined.origin),
     }
@@ -186,6 +212,7 @@ def success_of(
     sets: int = SETS,
     samples: int = 1024,
     seed: int = 0,
+    judge: Judge | None = None,
     jobs: int = 2,
     step: Callable[[], None] = lambda: None,
 ) -> SuccessTable:
@@ -193,11 +220,12 @@ def success_of(
 
     Args:
         trials: Trials of the table.
-        sets: Greatest number of pairs; a quarter as many singles.
+        sets: Greatest number of pairs; a quarter as many of other sets.
         samples: Number of samples of the sets that remain to the end.
         seed: Seed of the samples.
+        judge: Judges motions; None for none.
         jobs: Number of threads.
-        step: Called after the screening and after each round, for each size.
+        step: Called after the screening, after each round for each size, and at the end.
     """
     table = trials.scored.sets
     offsets = trials.errors.draw(samples, seed, stream=ESTIMATION_STREAM)
@@ -206,18 +234,111 @@ def success_of(
         part = {name: values[start:stop] for name, values in offsets.items()}
         return trials.reached(table.candidates[rows], part, jobs=jobs)
 
+    contenders = _contending(trials, sets, seed, jobs)
+    step()
     found: list[tuple[IntArray, HalvingEstimates]] = []
-    for pool, most in ((_singles(table), -(-sets // 4)), (_pairs(table), sets)):
-        contenders = _screened(trials, pool, most, seed, jobs)
-        step()
-        found.append(
-            (contenders, successive_halving(contenders, table.weights, samples, attempt, step))
+    for rows in contenders:
+        estimates = successive_halving(
+            rows, table.weights, samples, attempt, step, whole=not trials.is_paper
         )
-    return _as_table(table, found)
+        found.append((rows, estimates))
+    estimated = _as_table(table, found)
+    if judge is not None and done_by(trials, judge) == "motion" and len(estimated.low):
+        every = PerturbedPoints(trials, offsets, jobs)
+        estimated = _judged_by_motions(trials, every, estimated, judge, seed)
+    step()
+    return estimated
+
+
+def _contending(trials: Trials, most: int, seed: int, jobs: int) -> list[IntArray]:
+    """Return the sets for successive halving, of each size, as rows of candidates."""
+    table, few = trials.scored.sets, -(-most // 4)
+    if trials.is_paper:
+        contending = (_singles(table), few), (_pairs(table), most)
+        return [_screened(trials, pool, count, seed, jobs) for pool, count in contending]
+    pool = pool_of(trials.scored, trials.grid)
+    offsets = trials.errors.draw(SCREENED, seed, stream="screening")
+    reached = trials.reached(table.candidates[pool], offsets, jobs=jobs)
+    return list(best_sets(table, pool, reached, most).values())
+
+
+def _judged_by_motions(
+    trials: Trials, samples: PerturbedPoints, estimated: SuccessTable, judge: Judge, seed: int
+) -> SuccessTable:
+    """Return estimates of the success by approaches with those by motions of the best sets."""
+    done = JudgedSets(samples, judge, seed)
+    order = np.argsort(-estimated.low, kind="stable")
+    single = order[estimated.sizes[order] == 1][:FINALISTS_OF_ONE]
+    finalists = np.unique(np.concatenate([order[:FINALISTS], single])).tolist()
+
+    def judged(row: int, count: int) -> NDArray[np.bool_]:
+        return done.rooms(trials.points(estimated.set_at(row)), count)
+
+    first, most = (min(count, samples.samples) for count in (FIRST_JUDGED, MOST_JUDGED))
+    rooms = {row: judged(row, first) for row in finalists}
+    for row in sorted(finalists, key=lambda row: -float(rooms[row].mean()))[:LAST]:
+        rooms[row] = judged(row, most)
+    approached = {row: float(estimated.success[row]) for row in finalists}
+    kept = [rooms[row].mean() / one for row, one in approached.items() if one > LEAST_COMPARED]
+    factor = min(1.0, *kept, 1.0)
+    mean, low, high = (factor * part for part in (estimated.success, estimated.low, estimated.high))
+    counts = estimated.samples.copy()
+    for row in finalists:
+        counts[row] = len(rooms[row])
+        found = intervals_of(rooms[row][None].astype(np.float64))
+        mean[row], low[row], high[row] = (float(part[0]) for part in found)
+    # Of what no motion is known is never ranked before what is done by as few stops.
+    judged_low = np.where(np.isin(np.arange(len(low)), finalists), low, -np.inf)
+    for row in np.setdiff1d(np.arange(len(low)), finalists):
+        below = float(judged_low[estimated.sizes <= estimated.sizes[row]].max())
+        low[row] = min(low[row], max(below, 0.0) * (1.0 - FRACTION_TOLERANCE))
+    return dataclasses.replace(
+        estimated, success=mean, low=low, high=high, samples=counts, rooms_done=mean.copy()
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class JudgedSets:
+    """In which samples all goals are done from sets, by motions; what was found once is kept."""
+
+    samples: PerturbedPoints
+    judge: Judge
+    seed: int
+    known: dict[bytes, NDArray[np.bool_]] = field(default_factory=dict)
+    """Whether all goals are done in the first samples, by the points of a set."""
+    parts: dict[tuple[int, int], PerturbedPoints] = field(default_factory=dict)
+    """Ranges of the samples, with their environments."""
+
+    def rooms(self, points: FloatArray, count: int) -> NDArray[np.bool_]:
+        """Return in which of the first samples all goals are done, shape (count,).
+
+        Args:
+            points: The members, as values of the axes [m or rad], shape (m, axes).
+            count: Number of samples.
+        """
+        before = self.known.get(points.tobytes(), np.zeros(0, dtype=np.bool_))
+        if count > len(before):
+            window = len(before), count
+            if window not in self.parts:
+                self.parts[window] = self.samples.only(np.arange(*window))
+            part = self.parts[window]
+            found = part.scores(points)
+            complete = np.flatnonzero(np.logical_or.reduce(found.reached).all(axis=1))
+            whole = np.zeros(part.samples, dtype=np.bool_)
+            verdict = self.judge(part, points, found, complete, seed=self.seed)
+            whole[complete] = verdict.all(axis=1)
+            before = self.known[points.tobytes()] = np.concatenate([before, whole])
+        return before[:count]
 
 
 def with_success(
-    trials: Trials, refined: RefinedTable, *, samples: int, seed: int, jobs: int = 2
+    trials: Trials,
+    refined: RefinedTable,
+    *,
+    samples: int,
+    seed: int,
+    judge: Judge | None = None,
+    jobs: int = 2,
 ) -> RefinedTable:
     """Return refined sets with their success in the samples that the surest sets of the grid get.
 
@@ -226,18 +347,33 @@ def with_success(
         refined: The sets.
         samples: Number of samples.
         seed: Seed of the samples.
+        judge: Judges motions; None for none. It judges some samples only.
         jobs: Number of threads.
     """
     offsets = trials.errors.draw(samples, seed, stream=ESTIMATION_STREAM)
-    rows, columns = np.nonzero(refined.origin != NO_MEMBER)
-    found = PerturbedPoints(trials, offsets, jobs).reached(refined.values[rows, columns])
-    fractions = [
-        tc_reachability(np.logical_or.reduce(found[rows == row]), refined.weights)
-        for row in range(len(refined.origin))
+    points = PerturbedPoints(trials, offsets, jobs)
+    sets = [
+        values[origin != NO_MEMBER]
+        for values, origin in zip(refined.values, refined.origin, strict=True)
     ]
-    mean, low, high = intervals_of(np.array(fractions))
-    every = np.full(len(mean), samples, dtype=np.int32)
-    success = Estimates(success=mean, low=low, high=high, samples=every)
+    if judge is not None and done_by(trials, judge) == "motion":
+        samples = min(samples, REFINED_JUDGED)
+        of_sets = JudgedSets(points, judge, seed)
+        whole = fractions = np.array([of_sets.rooms(values, samples) for values in sets])
+    else:
+        found = points.reached(np.concatenate(sets))
+        ends = np.cumsum([len(values) for values in sets])
+        reached = np.array([np.logical_or.reduce(part) for part in np.split(found, ends[:-1])])
+        whole = np.asarray(reached.all(axis=2))
+        fractions = tc_reachability(reached, refined.weights) if trials.is_paper else whole
+    mean, low, high = intervals_of(fractions.astype(np.float64))
+    success = Estimates(
+        success=mean,
+        low=low,
+        high=high,
+        samples=np.full(len(mean), samples, dtype=np.int32),
+        rooms_done=whole.mean(axis=1),
+    )
     return dataclasses.replace(refined, success=success)
 
 
@@ -251,15 +387,17 @@ def _as_table(table: SetTable, found: list[tuple[IntArray, HalvingEstimates]]) -
         if len(rows):
             flat[:, : rows.shape[1]] = table.candidates[rows[order]]
         members.append(flat)
-        parts = (estimates.mean, estimates.low, estimates.high, estimates.samples)
+        parts = (estimates.mean, estimates.low, estimates.high, estimates.rooms, estimates.samples)
         columns.append([part[order] for part in parts])
-    mean, low, high, samples = (np.concatenate(parts) for parts in zip(*columns, strict=True))
+    joined = (np.concatenate(parts) for parts in zip(*columns, strict=True))
+    mean, low, high, rooms, samples = joined
     return SuccessTable(
         members=np.concatenate(members),
         success=mean,
         low=low,
         high=high,
         samples=samples.astype(np.int32),
+        rooms_done=rooms,
     )
 
 
@@ -336,6 +474,8 @@ class HalvingEstimates:
     """Lower end of its 95 % interval."""
     high: FloatArray
     """Upper end."""
+    rooms: FloatArray
+    """Fraction of its samples in which all goals are reached."""
     samples: IntArray
     """Number of samples of each set."""
     survivors: IntArray
@@ -362,6 +502,8 @@ def successive_halving(
     samples: int,
     attempt: Attempt,
     on_round: Callable[[], None] = lambda: None,
+    *,
+    whole: bool = False,
 ) -> HalvingEstimates:
     """Return estimates of the success of sets, with the most samples for the best of them.
 
@@ -378,6 +520,7 @@ def successive_halving(
         samples: Number of samples of the sets that are never rejected.
         attempt: Evaluates members.
         on_round: Called after each round.
+        whole: Whether a sample counts only if all goals are reached in it, not by their weights.
     """
     # Imported here because it takes a second.
     from scipy.special import ndtri
@@ -386,27 +529,32 @@ def successive_halving(
     count = len(sets)
     # float32 keeps seven digits of the fraction of goals reached.
     fractions = np.zeros((count, samples), dtype=np.float32)
+    complete = np.zeros((count, samples), dtype=np.bool_)
     counts = np.zeros(count, dtype=np.int64)
     alive = np.arange(count)
     bound = float(ndtri(1.0 - (1.0 - CONFIDENCE) / max(1, count * len(sizes))))
     done = 0
     for size in sizes:
         if alive.size:
-            _fill(fractions, sets, alive, weights, attempt, done, size)
+            _fill(fractions, complete, sets, alive, weights, attempt, done, size)
+            if whole:
+                fractions[alive, done:size] = complete[alive, done:size]
             counts[alive] = size
             alive = _best_half(alive, fractions[alive, :size], bound)
         done = size
         on_round()
-    mean, low, high = np.zeros(count), np.zeros(count), np.ones(count)
+    mean, low, high, rooms = np.zeros(count), np.zeros(count), np.ones(count), np.zeros(count)
     for size in sizes:
         rows = np.flatnonzero(counts == size)
         if rows.size:
             mean[rows], low[rows], high[rows] = intervals_of(fractions[rows, :size])
-    return HalvingEstimates(mean, low, high, counts, alive)
+            rooms[rows] = complete[rows, :size].mean(axis=1)
+    return HalvingEstimates(mean, low, high, rooms, counts, alive)
 
 
 def _fill(
     fractions: NDArray[np.float32],
+    complete: NDArray[np.bool_],
     sets: IntArray,
     rows: IntArray,
     weights: FloatArray,
@@ -414,7 +562,7 @@ def _fill(
     start: int,
     stop: int,
 ) -> None:
-    """Compute the fractions of some sets in samples start <= s < stop."""
+    """Compute the fractions of some sets in samples start <= s < stop, and whether they are 1."""
     members, number = np.unique(sets[rows], return_inverse=True)
     number = number.reshape(rows.size, -1)
     found = attempt(members, start, stop)
@@ -424,6 +572,7 @@ def _fill(
         for column in number[part, 1:].T:
             reached = reached | found[column]
         fractions[rows[part], start:stop] = tc_reachability(reached, weights)
+        complete[rows[part], start:stop] = reached.all(axis=2)
 
 
 def _best_half(alive: IntArray, fractions: NDArray[np.float32], bound: float) -> IntArray:

@@ -20,7 +20,7 @@ from tcs.placement.robustness.kept_pairs import EQUAL_REACHABILITY, uniform_sets
 from tcs.placement.robustness.perturbed_points import PerturbedPoints
 from tcs.placement.robustness.statistics import Mean, binomial_interval, mean_of
 from tcs.placement.robustness.trials import Errors, Progress, Trials
-from tcs.placement.store import PAPER, ScoreFile, StateTables, state_to_json
+from tcs.placement.store import ScoreFile, StateTables, state_to_json
 from tcs.placement.tables import tc_reachability
 
 SELECTIONS = ("best", "single", "robust", "refined", "uniform", "equal")
@@ -42,14 +42,13 @@ def done_by(trials: Trials, judge: Judge | None) -> str:
     """Return by what a goal is done, one of `DONE_BY`.
 
     Args:
-        trials: Trials of a score file. Without approach, nothing is said about motions; the paper
-            has none.
+        trials: Trials of a score file. Without approach, nothing is said about motions; by the
+            rules of the paper there are none.
         judge: Who judges motions; None if nobody does.
     """
     if not trials.with_approach:
         return "posture"
-    is_paper = trials.file.metadata.get(PAPER) is True
-    return "approach" if judge is None or is_paper else "motion"
+    return "approach" if judge is None or trials.is_paper else "motion"
 
 
 _DRAWN = {"uniform": EQUAL_REACHABILITY, "equal": 1.0}

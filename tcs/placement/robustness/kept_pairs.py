@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from tcs.errors import SelectionError, TcsError
 from tcs.model.random_streams import named_generator
 from tcs.placement.tables import SetTable
-from tcs.placement.tables.sets import FRACTION_TOLERANCE
+from tcs.placement.tables.sets import DISTANCE_TOLERANCE, FRACTION_TOLERANCE
 
 IntArray = NDArray[np.int64]
 FloatArray = NDArray[np.float64]
@@ -125,6 +126,24 @@ def _kept(
         & (reachability + manipulability >= least_sum)
     )
     return Pairs(first[kept], second[kept], reachability[kept], manipulability[kept])
+
+
+def allowed_pairs(
+    sets: SetTable, first: NDArray[np.integer[Any]], second: NDArray[np.integer[Any]]
+) -> NDArray[np.bool_]:
+    """Return which pairs of candidates keep the rules of the table's sets, shape (n, m).
+
+    Args:
+        sets: The table.
+        first: Rows of the first members, shape (n,).
+        second: Rows of the second members, shape (m,).
+    """
+    at = sets.cell_xy[sets.cell]
+    distance = np.hypot(*(at[first][:, None] - at[second]).transpose(2, 0, 1))
+    allowed = distance >= sets.min_distance - DISTANCE_TOLERANCE
+    if sets.same_environment:
+        allowed &= sets.state[first][:, None] == sets.state[second]
+    return np.asarray(allowed)
 
 
 def uniform_sets(

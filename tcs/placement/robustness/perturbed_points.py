@@ -11,15 +11,20 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
-from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
+from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.kernel.problem import Problem, build_problem, with_environment
 from tcs.kernel.rows import Rows
 from tcs.kernel.scores import JOINTS
-from tcs.kernel.sweep import blocked_grippers, gripper_contacts
+from tcs.kernel.sweep import blocked_grippers
 from tcs.model.grid import ROBOT_AXES
 from tcs.model.scene import environment_at, torso_at
 from tcs.placement.robustness.error_model import Offsets, displaced, samples_of
-from tcs.placement.robustness.perturbed_scenes import HandScenes, PerturbedScenes, Run
+from tcs.placement.robustness.perturbed_scenes import (
+    HandScenes,
+    PerturbedScenes,
+    Run,
+    grippers_of,
+)
 from tcs.placement.robustness.trials import HandTrials, Progress, counter
 from tcs.placement.scoring.approaches import ApproachScorer
 from tcs.placement.scoring.kernel_start import KernelStart
@@ -232,7 +237,7 @@ class PerturbedPoints:
             problem = with_environment(
                 robot, environment_at(hand.lowered, hand.scene, hand.job.task, samples)
             )
-            known = Scorer(problem, self._grippers(problem))
+            known = Scorer(problem, grippers_of(problem, self.jobs))
             while self.environments and len(self.environments) * self.samples >= KEPT_SAMPLES:
                 self.environments.pop(next(iter(self.environments)))
         self.environments[key] = known
@@ -240,20 +245,6 @@ class PerturbedPoints:
         goals = robot.goals._replace(R=of.goals.R, p=of.goals.p)
         problem = robot._replace(environment=of.environment, goals=goals)
         return Scorer(problem, known.grippers, approaches)
-
-    def _grippers(self, problem: Problem) -> IntArray:
-        """Return `gripper_contacts` of all samples: with free goals, ten milliseconds for each."""
-
-        def contacts(states: IntArray) -> IntArray:
-            goals, shapes = problem.goals, problem.environment.shapes[states]
-            goals = goals._replace(R=goals.R[states], p=goals.p[states])
-            environment = problem.environment._replace(shapes=shapes)
-            return gripper_contacts(problem._replace(goals=goals, environment=environment))
-
-        starts = range(0, self.samples, BATCH)
-        parts = [np.arange(start, min(start + BATCH, self.samples)) for start in starts]
-        found = Parallel(n_jobs=self.jobs, prefer="threads")(map(delayed(contacts), parts))
-        return np.concatenate(found)
 
 
 def _robot_at(

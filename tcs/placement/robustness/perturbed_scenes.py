@@ -11,8 +11,11 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from tcs.errors import TcsError
+from tcs.kernel.arrays import IntArray
 from tcs.kernel.dexterity import ANY_SOLUTION
+from tcs.kernel.problem import Problem
 from tcs.kernel.rows import Rows
+from tcs.kernel.sweep import gripper_contacts
 from tcs.placement.scoring.hands import HandScores, best_of_hands
 from tcs.placement.scoring.scorer import Scorer
 from tcs.placement.scoring.together import Hands, together_at
@@ -20,6 +23,25 @@ from tcs.placement.tables import Reason
 
 BATCH = 500
 """Pairs of configuration and sample that a thread evaluates at a time: milliseconds of work."""
+
+
+STATES = 50
+"""Samples in which a thread looks for contacts of the gripper at a time: with free goals, half a
+second of work."""
+
+
+def grippers_of(problem: Problem, jobs: int) -> IntArray:
+    """Return `gripper_contacts` of a problem with many states, found by several threads."""
+
+    def contacts(states: IntArray) -> IntArray:
+        goals, shapes = problem.goals, problem.environment.shapes[states]
+        goals = goals._replace(R=goals.R[states], p=goals.p[states])
+        environment = problem.environment._replace(shapes=shapes)
+        return gripper_contacts(problem._replace(goals=goals, environment=environment))
+
+    count = len(problem.goals.p)
+    parts = [np.arange(n, min(n + STATES, count)) for n in range(0, max(count, 1), STATES)]
+    return np.concatenate(Parallel(n_jobs=jobs, prefer="threads")(map(delayed(contacts), parts)))
 
 
 class Run(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,7 +29,13 @@ from tcs.placement.robustness.body_collisions import (
 )
 from tcs.placement.robustness.error_model import ErrorModel, Offsets, displaced, samples_of
 from tcs.placement.robustness.kept_runs import kept_runs, states_digest, trials_key
-from tcs.placement.robustness.perturbed_scenes import BATCH, HandScenes, PerturbedScenes, Run
+from tcs.placement.robustness.perturbed_scenes import (
+    BATCH,
+    HandScenes,
+    PerturbedScenes,
+    Run,
+    grippers_of,
+)
 from tcs.placement.scoring.approaches import ApproachScorer, approach_lines
 from tcs.placement.scoring.hands import HandScores
 from tcs.placement.scoring.job import Job, whole_task
@@ -45,6 +51,9 @@ if TYPE_CHECKING:
 
 CHUNK = 1000
 """Samples whose environments are held in memory together: some ten megabytes."""
+
+KEPT_SCENES = 16
+"""States of the environment that are kept with their samples, some ten megabytes each at most."""
 
 Errors = str | Path | Mapping[str, ErrorDistribution] | None
 """Path of an error file, errors by joint, or None for the errors of the environment."""
@@ -70,17 +79,21 @@ class HandTrials:
     lines: ApproachLines | None = None
     """The approaches of the goals, if the file was scored with approach."""
 
-    def scenes(self, positions: Mapping[str, FloatArray], measure: str) -> HandScenes:
+    def scenes(
+        self, positions: Mapping[str, FloatArray], measure: str, jobs: int = 1
+    ) -> HandScenes:
         """Return the environment with its joints at each sample's positions, as arrays.
 
         Args:
             positions: Joint positions [m or rad], shapes (samples,).
             measure: Name of the dexterity measure.
+            jobs: Number of threads.
         """
         arrays = environment_at(self.lowered, self.scene, self.job.task, _states(positions))
         arrays = arrays._replace(body_vs_environment=self.body_pairs)
         problem = build_problem(arrays, measure)
-        return HandScenes(Scorer.of(problem, self.approaches), self.goals)
+        scorer = Scorer(problem, grippers_of(problem, jobs), self.approaches)
+        return HandScenes(scorer, self.goals)
 
     @cached_property
     def approaches(self) -> ApproachScorer | None:
@@ -119,6 +132,8 @@ class Trials:
     """The robot with each hand."""
     start: KernelStart
     """The start of the kernel, which is put off until something has to be scored."""
+    known_scenes: dict[str, PerturbedScenes] = field(default_factory=dict, repr=False)
+    """States of the environment in samples that were evaluated last, by their hash."""
     blocks: Blocks | None = None
     """Where the goals that are reached are kept; None to keep none."""
 
@@ -263,6 +278,11 @@ class Trials:
     def observed(self) -> Mapping[str, float]:
         """Observed state that the table was scored for, by joint [m or rad]."""
         return self.file.observed_states[self.table]
+
+    @property
+    def is_paper(self) -> bool:
+        """Whether success is counted by the rules of the paper: goals, not rooms, and postures."""
+        return self.body_collisions == "paper"
 
     @property
     def measure(self) -> str:
@@ -469,26 +489,33 @@ class Trials:
         """
         return displaced(self.job, self.scene, self.nominal(state), offsets)
 
-    def _scenes(self, state: int, offsets: Offsets) -> PerturbedScenes:
-        """Return one state of the environment in each sample, as arrays."""
+    def _scenes(self, state: int, offsets: Offsets, jobs: int = 1) -> PerturbedScenes:
+        """Return one state of the environment in each sample, as arrays; the last ones are kept."""
         self.start.ensure()
         positions, _ = self.positions(state, offsets)
-        scenes = tuple(hand.scenes(positions, self.measure) for hand in self.hands)
-        return PerturbedScenes(scenes, self.together)
+        key = states_digest(positions, lambda some: "")
+        found = self.known_scenes.pop(key, None)
+        if found is None:
+            scenes = tuple(hand.scenes(positions, self.measure, jobs) for hand in self.hands)
+            found = PerturbedScenes(scenes, self.together)
+        self.known_scenes[key] = found
+        while len(self.known_scenes) > KEPT_SCENES:
+            self.known_scenes.pop(next(iter(self.known_scenes)))
+        return found
 
     def _found(
         self, state: int, offsets: Offsets, poses: Rows, runs: list[Run], jobs: int
     ) -> Iterator[tuple[Run, BoolArray]]:
         """Yield the goals that each run reaches in one state of the environment."""
         if self.blocks is None:
-            yield from self._scenes(state, offsets).reached(poses, runs, jobs)
+            yield from self._scenes(state, offsets, jobs).reached(poses, runs, jobs)
             return
         positions, _ = self.positions(state, offsets)
         states = states_digest(
             positions, lambda some: "".join(hand.arrays_digest(some) for hand in self.hands)
         )
         yield from kept_runs(
-            self.blocks, states, lambda: self._scenes(state, offsets), poses, runs, jobs
+            self.blocks, states, lambda: self._scenes(state, offsets, jobs), poses, runs, jobs
         )
 
 

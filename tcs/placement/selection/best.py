@@ -54,7 +54,13 @@ from tcs.placement.selection.travel import (
 )
 from tcs.placement.selection.utility import UtilityWeights, utility
 from tcs.placement.store import MotionFile, ScoreFile
-from tcs.placement.tables import RefinedTable, Window, tc_manipulability, tc_reachability
+from tcs.placement.tables import (
+    Estimates,
+    RefinedTable,
+    Window,
+    tc_manipulability,
+    tc_reachability,
+)
 from tcs.placement.tables.sets import MOST_MEMBERS
 from tcs.placement.tables.success import NO_MEMBER
 
@@ -539,6 +545,7 @@ class _Query:
             moves=changed_axes(self.here, members),
             success=None if success is None else success[0],
             success_ci95=None if success is None else success[1:],
+            rooms_done=self._rooms_of(rows),
             unreachable=int(np.count_nonzero(~legs.reachable[index.sets.cell])),
             constraints=self.found.left if self.found is not None else (),
             footprint=self.found.footprint if self.found is not None else None,
@@ -553,14 +560,24 @@ class _Query:
             seconds=0.0,
         )
 
-    def _success_of(self, rows: tuple[int, ...]) -> tuple[float, float, float] | None:
-        """Return mean, lower and upper end of the success of a set; None without an estimate."""
+    def _estimate_of(self, rows: tuple[int, ...]) -> tuple[Estimates, int] | None:
+        """Return the table with the estimate of a set, and its row; None without an estimate."""
         number, refined = self.index.refined_set(rows[0]), self.index.refined
         if refined is not None and number is not None:
-            return None if refined.success is None else refined.success.at(number)
+            return None if refined.success is None else (refined.success, number)
         known = self.tables.success
         number = None if known is None else known.row_of(self._chosen(rows).indices)
-        return None if known is None or number is None else known.at(number)
+        return None if known is None or number is None else (known, number)
+
+    def _success_of(self, rows: tuple[int, ...]) -> tuple[float, float, float] | None:
+        """Return mean, lower and upper end of the success of a set; None without an estimate."""
+        found = self._estimate_of(rows)
+        return None if found is None else found[0].at(found[1])
+
+    def _rooms_of(self, rows: tuple[int, ...]) -> float | None:
+        """Return in which fraction of rooms a set does all goals; None without an estimate."""
+        found = self._estimate_of(rows)
+        return None if found is None else found[0].rooms_at(found[1])
 
     def _low_of(self, rows: tuple[int, ...]) -> float | None:
         """Return the lower confidence bound of the success of a set; None without an estimate."""

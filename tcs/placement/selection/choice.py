@@ -209,6 +209,8 @@ class Choice:
     """Estimated success of the set under error; None if it was not estimated."""
     success_ci95: tuple[float, float] | None
     """95 % confidence interval of the success."""
+    rooms_done: float | None = None
+    """Estimated fraction of rooms in which all goals are done; None if it was not estimated."""
     unreachable: int
     """Number of candidates to which no path leads from the current position."""
     seconds: float
@@ -272,6 +274,8 @@ class Choice:
         }
         if self.success is not None and self.success_ci95 is not None:
             plain |= {"success": self.success, "success_ci95": list(self.success_ci95)}
+        if self.rooms_done is not None:
+            plain["rooms_done"] = self.rooms_done
         if self.match is not None and self.match.state:
             plain |= self.match.to_json()
         if self.refined is not None:

@@ -19,9 +19,9 @@ NO_MEMBER = -1
 class Estimates(ArrayTable):
     """Estimated success of K sets under error; read-only.
 
-    The success of a set is the probability that a goal, drawn by its weight, is reached by any
-    member in a randomly perturbed environment: the mean of P_R under error, as in Table I of the
-    TCS paper.
+    The success of a set is the probability that all goals are done from its members in a randomly
+    perturbed environment. By the rules of the paper it is the probability that a goal, drawn by its
+    weight, is reached by any member: the mean of P_R under error, as in Table I of the TCS paper.
     """
 
     success: NDArray[np.float64]
@@ -32,11 +32,15 @@ class Estimates(ArrayTable):
     """Upper end, shape (K,)."""
     samples: NDArray[np.int32]
     """Number of samples of the mean, shape (K,)."""
+    rooms_done: NDArray[np.float64] | None = None
+    """Fraction of the samples in which all goals are done, shape (K,); None in files of older
+    versions. It is the success, but for the rules of the paper."""
 
     WHAT = "estimates of success"
     COLUMNS: ClassVar[Columns] = {
         **dict.fromkeys(("success", "low", "high"), Column(np.float64, "K")),
         "samples": Column(np.int32, "K", Form.SMALLEST),
+        "rooms_done": Column(np.float64, "K", least=0.0, optional=True),
     }
 
     def __post_init__(self) -> None:
@@ -51,6 +55,15 @@ class Estimates(ArrayTable):
         # Rounding of a mean of ones must not refuse it.
         require(bool(np.all(inside)), f"{self.WHAT}: 0 <= low <= success <= high <= 1 must hold.")
         require(bool(np.all(self.samples > 0)), f"{self.WHAT}: samples must be positive.")
+
+    @property
+    def counts_rooms(self) -> bool:
+        """Whether success is the fraction of the samples in which all goals are done."""
+        return self.rooms_done is not None and np.array_equal(self.rooms_done, self.success)
+
+    def rooms_at(self, row: int) -> float | None:
+        """Return the fraction of the samples in which all goals are done from a set, if known."""
+        return None if self.rooms_done is None else float(self.rooms_done[row])
 
     def at(self, row: int) -> tuple[float, float, float]:
         """Return mean, lower and upper end of a set."""

@@ -178,7 +178,8 @@ def _success(report: ScoreReport) -> list[Block]:
             f"Estimated by tcs {record['program_version']} from up to {record['samples']:,} "
             f"samples, seed {record['seed']}, with errors of {widths}; collisions {collisions}. In "
             "each sample the configurations are unchanged and the arm postures are computed again"
-            f"{', with their approaches' if APPROACH in report.file.metadata else ''}."
+            f"{', with their approaches' if APPROACH in report.file.metadata else ''}"
+            f"{', and motions for the best sets' if record.get('done_by') == 'motion' else ''}."
         ),
         table,
     ]

@@ -61,13 +61,15 @@ class SuccessEstimate(NamedTuple):
     """Estimated success of a set under error."""
 
     mean: float
-    """Mean of P_R over the samples."""
+    """Mean over the samples."""
     low: float
     """Lower end of its 95 % interval."""
     high: float
     """Upper end."""
     samples: int
     """Number of samples."""
+    of_rooms: bool
+    """Whether the mean is that of rooms in which all goals are done, not of P_R."""
 
 
 @dataclass(frozen=True)
@@ -174,7 +176,7 @@ class ShownSet:
         if found is None:
             return None
         row = self.refined.row
-        return SuccessEstimate(*found.at(row), int(found.samples[row]))
+        return SuccessEstimate(*found.at(row), int(found.samples[row]), found.counts_rooms)
 
     @property
     def places(self) -> list[str]:
@@ -237,4 +239,4 @@ def estimate_of(success: SuccessTable | None, members: tuple[int, ...]) -> Succe
     row = success.row_of(members) if success is not None and members else None
     if success is None or row is None:
         return None
-    return SuccessEstimate(*success.at(row), int(success.samples[row]))
+    return SuccessEstimate(*success.at(row), int(success.samples[row]), success.counts_rooms)

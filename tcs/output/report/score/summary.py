@@ -16,6 +16,7 @@ from tcs.output.words import (
     settings_text,
     stop_places,
 )
+from tcs.output.words.success import success_text
 from tcs.placement.constraints import constraint_texts
 from tcs.placement.store import APPROACH, WITHOUT_APPROACH, state_to_json
 from tcs.placement.tables import Reason
@@ -141,7 +142,8 @@ def _success(report: ScoreReport) -> list[str]:
     found = report.shown.success
     if found is None:
         return []
+    text = success_text(percentage(found.mean), of_rooms=found.of_rooms)
     return [
-        f"Estimated success in the randomly perturbed environment: {percentage(found.mean)} of the "
-        f"goals (95% between {percent(found.low)} and {percentage(found.high)})."
+        f"Estimated success in the randomly perturbed environment: {text} (95% between "
+        f"{percent(found.low)} and {percentage(found.high)})."
     ]

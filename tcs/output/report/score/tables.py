@@ -237,9 +237,10 @@ def success_table(report: ScoreReport) -> Table | None:
                 *estimate,
             ]
         )
+    what = "the rooms in which all goals are done" if success.counts_rooms else "the goals reached"
     return Table(
-        "Estimated percentage of the goals reached in the randomly perturbed environment. The most "
-        "robust set has the greatest lower confidence bound.",
+        f"Estimated percentage of {what}, in the randomly perturbed environment. The most robust "
+        "set has the greatest lower confidence bound.",
         [
             Column("Set", is_number=False),
             Column("Configurations", is_number=False),
