@@ -49,10 +49,13 @@ def report_evaluation(result: Mapping[str, Any]) -> None:
         f"under error {result['mean']:.1%} of the goals{interval}, "
         f"standard deviation {result['std']:.1%}"
     )
-    low, high = result["rooms_done_ci95"]
+    exact = ""
+    if result["samples"] > 1:
+        low, high = result["rooms_done_ci95"]
+        exact = f" (95 % interval {low:.1%} to {high:.1%})"
     out.print(
-        f"all goals done in {result['rooms_done']:.1%} of {result['samples']:,} samples "
-        f"(95 % interval {low:.1%} to {high:.1%}), reached in {result['complete']:.1%}"
+        f"all goals done in {result['rooms_done']:.1%} of {result['samples']:,} samples{exact}, "
+        f"reached in {result['complete']:.1%}"
     )
     out.print(DONE_BY[result["done_by"]])
     goals = ", ".join(f"{i}: {part:.1%}" for i, part in enumerate(result["per_goal"], start=1))

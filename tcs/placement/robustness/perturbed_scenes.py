@@ -31,7 +31,12 @@ second of work."""
 
 
 def grippers_of(problem: Problem, jobs: int) -> IntArray:
-    """Return `gripper_contacts` of a problem with many states, found by several threads."""
+    """Return `gripper_contacts` of a problem with many states, found by several threads.
+
+    Raises:
+        TcsError: If the number of threads is not positive.
+    """
+    _check_jobs(jobs)
 
     def contacts(states: IntArray) -> IntArray:
         goals, shapes = problem.goals, problem.environment.shapes[states]
@@ -42,6 +47,11 @@ def grippers_of(problem: Problem, jobs: int) -> IntArray:
     count = len(problem.goals.p)
     parts = [np.arange(n, min(n + STATES, count)) for n in range(0, max(count, 1), STATES)]
     return np.concatenate(Parallel(n_jobs=jobs, prefer="threads")(map(delayed(contacts), parts)))
+
+
+def _check_jobs(jobs: int) -> None:
+    if jobs < 1:
+        raise TcsError(f"jobs is {jobs}; must be 1 or more threads.")
 
 
 class Run(NamedTuple):
@@ -107,8 +117,7 @@ class PerturbedScenes(NamedTuple):
         Raises:
             TcsError: If the number of threads is not positive.
         """
-        if jobs < 1:
-            raise TcsError(f"jobs is {jobs}; must be 1 or more threads.")
+        _check_jobs(jobs)
         batches: list[list[Run]] = [[]]
         size = 0
         for run in runs:
