@@ -25,6 +25,7 @@ def with_estimates(**changes):
         "low": np.array([0.4, 0.6]),
         "high": np.array([0.6, 0.7]),
         "samples": np.array([64, 1024], dtype=np.int32),
+        "rooms_done": np.array([0.5, 0.625]),
     }
     success = SuccessTable(**(parts | changes))
     return dataclasses.replace(file, tables=(dataclasses.replace(table, success=success),))
@@ -34,7 +35,7 @@ def test_a_saved_file_is_loaded_unchanged(tmp_path):
     path, file = tmp_path / "file.tcs", with_estimates()
     save_scores(path, file)
     back = load_scores(path).nominal.success
-    for name in ("members", "success", "low", "high", "samples"):
+    for name in ("members", "success", "low", "high", "samples", "rooms_done"):
         written, read = getattr(file.nominal.success, name), getattr(back, name)
         assert np.array_equal(written, read)
         assert written.dtype == read.dtype
