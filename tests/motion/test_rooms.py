@@ -15,7 +15,6 @@ from tcs.motion.rooms import done_in_rooms, in_rooms
 from tcs.motion.stop_tour import plan_stop
 from tcs.placement import robustness
 from tcs.placement.robustness import PerturbedPoints, Trials, estimation
-from tcs.placement.store import PAPER
 from tests.environments import CORNER, write_environment
 
 NOTHING = {"person_y": ErrorDistribution(distribution="normal", std=1e-9)}
@@ -84,11 +83,12 @@ def test_the_same_seed_gives_the_same_rooms_and_verdicts(file, judged):
 
 
 def test_goals_are_done_by_postures_without_approach_and_as_in_the_paper(file, environment):
-    from dataclasses import replace
 
-    paper = replace(file, metadata={**file.metadata, PAPER: True})
+    found = tcs.evaluate(file, samples=2, jobs=1, body_collisions="paper")
+    assert found.done_by == "approach"
+    paper = tcs.score("shaving", environment, "pr2", paper=True, jobs=1)
     found = tcs.evaluate(paper, samples=2, jobs=1)
-    assert (found.done_by, found.body_collisions) == ("approach", "paper")
+    assert (found.done_by, found.body_collisions) == ("posture", "paper")
     plain = tcs.score("shaving", environment, "pr2", approach=False, jobs=1)
     found = tcs.evaluate(plain, samples=2, jobs=1)
     assert (found.done_by, found.body_collisions) == ("posture", "all")
