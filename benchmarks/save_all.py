@@ -48,6 +48,9 @@ PARTS: dict[str, tuple[str, ...]] = {
         *(f"{SCORES}/shaving-wheelchair-pr2.tcs", f"{SCORES}/feeding-wheelchair-pr2.tcs"),
         f"{SCORES}/bathing-bed-pr2.tcs",
     ),
+    "rooms_done": tuple(
+        f"{SCORES}/{name}-wheelchair-pr2.tcs" for name in ("shaving", "feeding", "brushing")
+    ),
     "done_table": (),
     "motions": (
         *(
