@@ -45,7 +45,7 @@ def test_a_file_of_another_row_is_refused(tmp_path):
     scores.mkdir()
     # The file of the first row contains scores of another robot.
     file = score_file()
-    file.metadata["robot"] = "tiago"
+    file.metadata.update(robot="tiago", paper=True)
     save_scores(scores / "shaving-wheelchair-pr2.tcs", file)
     for task, environment in load_paper().rows():
         if (task, environment) != ("shaving", "wheelchair"):

@@ -7,6 +7,7 @@ import pytest
 from tcs.placement.robustness import Trials
 from tcs.placement.scoring import score
 from tests.environments import BESIDE, write_environment
+from tests.exact import exact_task
 
 BED = {
     "bed_height": (0, 0.2, 2),
@@ -30,15 +31,17 @@ def environments(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def chair_file(environments):
-    """Shaving in the wheelchair, from a few base poses."""
-    return score("shaving", environments["chair"], paper=True)
+def chair_file(environments, tmp_path_factory):
+    """Shaving in the wheelchair, from a few base poses; all contacts of the body count."""
+    task = exact_task("shaving", tmp_path_factory.mktemp("chair"))
+    return score(task, environments["chair"], approach=False)
 
 
 @pytest.fixture(scope="session")
-def bed_file(environments):
+def bed_file(environments, tmp_path_factory):
     """Bathing on the bed, from a few base poses, for two shifts of the person."""
-    return score("bathing", environments["bed"], paper=True)
+    task = exact_task("bathing", tmp_path_factory.mktemp("bed"))
+    return score(task, environments["bed"], approach=False)
 
 
 @pytest.fixture(scope="session")

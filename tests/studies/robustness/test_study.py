@@ -69,6 +69,9 @@ def test_points_of_a_prediction_are_those_it_ranks(study):
 
 def test_a_file_of_another_row_is_refused():
     path, file = Path("feeding-wheelchair-pr2.tcs"), score_file()
+    with pytest.raises(StoreMismatchError, match="not scored as the paper scores its rows"):
+        check_row(path, file, "shaving", "wheelchair", "pr2")
+    file.metadata["paper"] = True
     check_row(path, file, "shaving", "wheelchair", "pr2")
     with pytest.raises(StoreMismatchError, match="has task 'shaving', not 'feeding'"):
         check_row(path, file, "feeding", "wheelchair", "pr2")
