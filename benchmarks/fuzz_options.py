@@ -109,6 +109,8 @@ COMMANDS = (
     Command("refine", ("scores.tcs",), ("--starts", "1", "--rounds", "1", "--out", "out.tcs")),
     Command("check", ("scores.tcs", "map.tcm")),
     Command("environment check", ("kitchen.yaml",)),
+    Command("new environment", ("new.yaml",)),
+    Command("new task", ("new.yaml",)),
     Command("app", ("scores.tcs",), _WINDOW),
     # Refused whatever the options are, so that none of the calls listens.
     Command("serve", ("none.tcs",), ("--host", "0.0.0.0"), is_refused=True),
@@ -225,16 +227,19 @@ def click_command(name: str) -> Any:
 
 
 def command_names() -> list[str]:
-    """Return the names of all commands."""
-    names = []
+    """Return the names of all commands, of several names of one that of `COMMANDS`."""
+    known = {command.name for command in COMMANDS}
+    names: dict[Any, str] = {}
     waiting: list[tuple[str, Any]] = [("", command_line())]
     while waiting:
         name, found = waiting.pop(0)
         inner = getattr(found, "commands", {})
         if name and (not inner or found.invoke_without_command):
-            names.append(name)
+            function = found.callback.__wrapped__
+            if function not in names or name in known:
+                names[function] = name
         waiting += [(f"{name} {word}".strip(), one) for word, one in inner.items()]
-    return names
+    return list(names.values())
 
 
 def odd_values(parameter: Any) -> tuple[str, ...]:

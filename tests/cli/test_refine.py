@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tcs
 from tcs.output.terminal.set_tables import report_refined
-from tcs.placement.refinement import refinement_summary
+from tcs.placement.refinement import refined_file, refinement_summary
 from tests.placement.refinement.test_refine import BESIDE
 
 
@@ -30,7 +30,7 @@ def test_scoring_with_refinement(tcs_command, tmp_path, monkeypatch):
     monkeypatch.setattr("tcs.placement.refinement.refined_file.FRESH_SAMPLES", 20)
     monkeypatch.setattr("tcs.placement.refinement.refined_file.starting_sets", one_start)
     # Of forty rounds; what more of them find is tested with the search.
-    monkeypatch.setitem(tcs.refine.__kwdefaults__, "rounds", 2)
+    monkeypatch.setitem(refined_file.refine.__kwdefaults__, "rounds", 2)
     environment, path = tmp_path / "beside.yaml", tmp_path / "a.tcs"
     environment.write_text(BESIDE)
     words = ("score", "shaving", "--environment", environment, "--out", path, "--refine")

@@ -18,8 +18,8 @@ PRINTED = {
     "05_observed_person": r"used \{'person_y': 0.0\}.*used \{'person_y': 0.1\}.*is 0.010 m from "
     r"its position at the shift \{'person_y': -0.1\}",
     "06_robustness": r"single: \d+\.\d%.*best: \d+\.\d%.*: (9\d\.\d|100\.0)% estimated",
-    "07_explain": r"goal 1: arm_blocked, l_upper_arm_link would touch .* Raise the torso 15 cm"
-    r".*goal 4: reached\ngoal 5: too_far\.",
+    "07_explain": r"goal 1: arm_blocked, l_upper_arm_link would touch .* Drive 5 cm back"
+    r".*goal 4: reached\ngoal 5: joint_limits\. Raise the torso 15 cm",
     "08_capability_map": r"[1-9]\d* base poses reach both.*score 0\.[1-9]",
     "09_live_score": r"observed joint: 100%.*observed frame: 100%",
     "10_viewer_page": r"wrote .*feeding\.html, [23]\.\d MB",

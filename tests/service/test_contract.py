@@ -376,7 +376,7 @@ JOBS_OF_SETS = {
             "seed": given["seed"],
         },
     ),
-    "tcs.placement.refinement.refine": (
+    "tcs.motion.refine": (
         RefineRequest,
         {
             "objective": "success",

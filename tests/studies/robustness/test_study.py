@@ -44,7 +44,9 @@ def test_the_number_of_processes_changes_nothing(study, score_path):
 
 
 def test_the_best_set_is_evaluated_as_anywhere_else(study, score_path):
-    found = evaluate(load_scores(score_path), samples=PLAN.samples, seed=PLAN.seed)
+    found = evaluate(
+        load_scores(score_path), samples=PLAN.samples, seed=PLAN.seed, body_collisions="paper"
+    )
     np.testing.assert_array_equal(study.best.reached, found.reached)
     np.testing.assert_array_equal(study.methods.paired[2, True].reached, found.reached)
 

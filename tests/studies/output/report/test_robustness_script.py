@@ -48,7 +48,9 @@ def test_a_file_of_another_row_is_refused(run, tmp_path):
     scores = tmp_path / "out" / "scores"
     scores.mkdir(parents=True)
     # The file was scored in the wheelchair.
-    save_scores(scores / "shaving-bed-pr2.tcs", score_file())
+    file = score_file()
+    file.metadata["paper"] = True
+    save_scores(scores / "shaving-bed-pr2.tcs", file)
     code, printed = run("--rows", "shaving/bed")
     assert code == 1
     assert "has environment 'wheelchair', not 'bed'" in printed
