@@ -16,7 +16,7 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
-from tcs.kernel.motion.search_trees import Trees, new_trees, random_state
+from tcs.kernel.motion.search_trees import Trees, new_trees
 from tcs.kernel.rows import Rows
 from tcs.model.grid import ROBOT_AXES
 from tcs.model.scene import environment_at, torso_at
@@ -114,7 +114,9 @@ class _Judge:
         The stop that approaches most goals comes first. Hard motions are sought only where they
         decide whether all goals are done: in a room that is lost, easy ones alone count.
         """
-        trees.random[:] = random_state(self.seed)
+        # Rooms are independent draws: with the same random numbers in each, a lucky or unlucky
+        # planner would be so in all of them, and intervals would be too narrow.
+        trees.random[:] = np.random.SeedSequence((self.seed, room)).generate_state(1, np.uint64)
         reached = self.found.reached[:, room]
         order = np.argsort(-reached.sum(axis=1), kind="stable").tolist()
         done = np.zeros(reached.shape[1], dtype=np.bool_)

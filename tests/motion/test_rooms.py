@@ -10,6 +10,7 @@ import tcs
 from tcs.files.paths import data_folder
 from tcs.kernel.motion.search_trees import new_trees
 from tcs.model.scene import ErrorDistribution
+from tcs.motion import rooms
 from tcs.motion.recheck import StopCheck
 from tcs.motion.rooms import done_in_rooms, in_rooms
 from tcs.motion.stop_tour import plan_stop
@@ -80,6 +81,25 @@ def test_the_same_seed_gives_the_same_rooms_and_verdicts(file, judged):
     assert approached.done_by == "approach"
     assert np.array_equal(approached.reached, judged.reached)
     assert np.array_equal(approached.done, judged.reached)
+
+
+def test_the_planner_draws_anew_in_each_room(file, monkeypatch):
+    begun = {}
+
+    class Visits(rooms._Visits):
+        def __init__(self, judge, room, trees):
+            super().__init__(judge, room, trees)
+            begun[room] = int(trees.random[0])
+
+    monkeypatch.setattr(rooms, "_Visits", Visits)
+    for seed in (2, 3):
+        tcs.evaluate(file, samples=SAMPLES, seed=seed, jobs=1)
+        drawn = {**begun}
+        assert len(drawn) > 1
+        assert len(set(drawn.values())) == len(drawn)
+    # Whatever room came before, and how many are judged.
+    tcs.evaluate(file, samples=SAMPLES // 2, seed=3, jobs=2)
+    assert begun == drawn
 
 
 def test_goals_are_done_by_postures_without_approach_and_as_in_the_paper(file, environment):
